@@ -1,0 +1,82 @@
+"""What a backend is given and what it gives back.
+
+A backend is one module (or folder) here. Its docstring's first line is its summary; it defines
+
+    CAPABILITIES: Capabilities
+    available() -> str | None         why it cannot run here, in one sentence that says what to install; None if it can
+    version() -> str                  of whatever does the work
+    train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict, report: Report) -> Trained
+    render(model: Path, cameras: Cameras) -> Iterator[np.ndarray]      (H, W, 3) float32 in [0, 1], one per camera
+
+`train` fills the empty folder `out`, and nothing outside it; the caller moves `out` into place when it returns.
+Evaluation is shared (`_evaluate.py`): a backend never sees a test image and never scores itself.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewbench.scenes.types import Cameras, Points
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What the harness may ask of a backend."""
+
+    device: str = "cpu"  # "cpu" or "cuda": a study gives each "cuda" job one GPU
+    iterations: bool = True  # obeys Budget.iterations
+    seconds: bool = True  # obeys Budget.seconds
+    resumes: bool = False  # takes up a killed run where it was
+    options: dict[str, Any] = field(default_factory=dict)  # its options with their defaults
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """The chosen views and nothing else."""
+
+    scene: str
+    names: tuple[str, ...]  # K frame names in the order chosen
+    cameras: Cameras  # K cameras, scaled to the size of the images
+    images: np.ndarray  # (K, H, W, 3) float32 in [0, 1]
+    points: Points | None  # seed points of the scene file; `seen_by` indexes the training split
+    chosen: np.ndarray  # (K,) int64 indices of the chosen views in the training split
+    paths: tuple[Path, ...] = ()  # K image files at full size
+    near: float = 0.0  # hint for a near plane in scene units; 0 leaves it to the backend
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Whichever limit comes first; at least one is set. Seconds are wall time without set-up and without probes."""
+
+    iterations: int | None = None
+    seconds: float | None = None
+
+
+# probe(render) -> mean test PSNR in dB of a few test views: `render` maps Cameras to images. The time it takes is
+# not the backend's. None where no curve is wanted.
+Probe = Callable[[Callable[[Cameras], Iterator[np.ndarray]]], float]
+
+
+@dataclass(frozen=True)
+class Report:
+    """How a running backend tells its caller."""
+
+    progress: Callable[[int, int | None, str], None] = lambda done, total, text: None  # step, of how many, what to show
+    probe: Probe | None = None
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What `train.json` records of a training run, besides what the caller knows itself."""
+
+    iterations: int
+    seconds: float  # wall time of training: set-up (reading, compiling) and probes are not in it
+    n_primitives: int | None = None
+    seeding: dict[str, Any] = field(default_factory=dict)  # where the starting points came from, and how many
+    curve: list[dict[str, float | None]] = field(default_factory=list)  # step, seconds, loss, test_psnr_db
+    device: str = "cpu"
+    threads: int = 1
+    notes: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,19 @@
+"""The one error that a user can cause, and the way it reaches them."""
+
+
+class UserError(Exception):
+    """What was got, what was expected and what to do, in one sentence that names the file and the frame.
+
+    The command line prints it as one line and exits with status 2; library callers catch it.
+    """
+
+    def __init__(self, message: str):
+        super().__init__(" ".join(str(message).split()))
+
+
+def nearest(word: str, known) -> str:
+    """`; did you mean 'x'?` for the known word nearest to `word`, or an empty string."""
+    import difflib
+
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    return f"; did you mean '{close[0]}'?" if close else ""

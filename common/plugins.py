@@ -1,0 +1,45 @@
+"""Finds the plug-ins of a folder: every module in it whose name does not start with an underscore.
+
+Selectors, backends, reports and scene formats are found in this way; no list of them is kept anywhere. A plug-in is
+a module (or a folder with `__init__.py`), its name is the module's with `_` written as `-`, and the first line of
+its docstring is its summary. Machinery that plug-ins share lives in the same folder in modules that start with `_`.
+"""
+
+import ast
+import importlib
+import importlib.util
+import pkgutil
+from pathlib import Path
+from types import ModuleType
+
+from viewbench.common.errors import UserError, nearest
+
+
+def names(package: str) -> list[str]:
+    """Sorted names of the plug-ins in `package` ("selectors", "scenes.formats"), without importing them."""
+    folder = importlib.import_module(f"viewbench.{package}")
+    found = (module.name for module in pkgutil.iter_modules(folder.__path__))
+    return sorted(name.replace("_", "-") for name in found if not name.startswith("_"))
+
+
+def load(package: str, name: str) -> ModuleType:
+    """Imports one plug-in. Raises UserError, which names the nearest right one, when there is none such."""
+    known = names(package)
+    if name not in known:
+        kind = package.rsplit(".", 1)[-1].rstrip("s")
+        raise UserError(f"unknown {kind} '{name}'{nearest(name, known)} (there are: {', '.join(known)})")
+    return importlib.import_module(module_name(package, name))
+
+
+def module_name(package: str, name: str) -> str:
+    """The import name of a plug-in."""
+    return f"viewbench.{package}.{name.replace('-', '_')}"
+
+
+def summary(package: str, name: str) -> str:
+    """First line of the plug-in's docstring, read without importing it."""
+    spec = importlib.util.find_spec(module_name(package, name))
+    if spec is None or spec.origin is None:
+        return ""
+    docstring = ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8")))
+    return (docstring or "").split("\n", 1)[0]

@@ -1,0 +1,168 @@
+"""Reads `environment.toml`: what differs from one machine to the next, documented key by key in that file."""
+
+import os
+import tomllib
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from viewbench.common.errors import UserError, nearest
+
+PACKAGE = Path(__file__).resolve().parent.parent
+FILE = "environment.toml"
+
+
+@dataclass(frozen=True)
+class Data:
+    root: str = ""  # folder of the captures that do not ship with viewbench
+
+
+@dataclass(frozen=True)
+class SceneEntry:
+    path: str
+    dataset: str = ""
+    holdout: str = ""
+    format: str = ""
+
+
+@dataclass(frozen=True)
+class Features:
+    encoder: str = "efficientnet-lite0"
+    cache: str = "results/features"
+    batch: int = 16
+
+
+@dataclass(frozen=True)
+class Compute:
+    threads: int = 1
+    device: str = "auto"
+
+
+@dataclass(frozen=True)
+class Metrics:
+    lpips_weights: str = ""
+
+
+@dataclass(frozen=True)
+class Tracking:
+    uri: str = "sqlite:///results/mlflow.db"
+    artifacts: str = "results/mlartifacts"
+    renders: int = 3
+
+
+@dataclass(frozen=True)
+class InstantNgp:
+    path: str = ""
+    python: str = ""
+
+
+@dataclass(frozen=True)
+class Command:
+    train: list
+    render: list = field(default_factory=list)
+    format: str = "transforms"
+    output: str = "{name}.png"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The whole file; `source` is where it was read."""
+
+    source: Path
+    data: Data = Data()
+    scenes: dict[str, SceneEntry] = field(default_factory=dict)
+    features: Features = Features()
+    compute: Compute = Compute()
+    metrics: Metrics = Metrics()
+    tracking: Tracking = Tracking()
+    instant_ngp: InstantNgp = InstantNgp()
+    command: dict[str, Command] = field(default_factory=dict)
+
+
+SECTIONS: dict[str, type] = {
+    "data": Data,
+    "features": Features,
+    "compute": Compute,
+    "metrics": Metrics,
+    "tracking": Tracking,
+    "instant_ngp": InstantNgp,
+}
+TABLES: dict[str, type] = {"scenes": SceneEntry, "command": Command}
+
+
+def find() -> Path:
+    """The file in force: VIEWBENCH_ENVIRONMENT, `environment.toml` here, or the one that viewbench ships."""
+    named = os.environ.get("VIEWBENCH_ENVIRONMENT")
+    if named:
+        return Path(named)
+    return Path(FILE) if Path(FILE).is_file() else PACKAGE / FILE
+
+
+def load(path: str | os.PathLike | None = None) -> Settings:
+    """Reads and checks the settings, environment variables last.
+
+    Raises UserError for an unreadable file, an unknown key (with the nearest right one) and a value of a wrong type.
+    """
+    source = Path(path) if path else find()
+    try:
+        raw = tomllib.loads(source.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UserError(f"settings '{source}' cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UserError(f"settings '{source}' is not valid TOML: {error}") from None
+    _known(raw, [*SECTIONS, *TABLES], str(source), "section")
+    for section in raw:
+        if not isinstance(raw[section], dict):
+            raise UserError(f"{source}: '{section}' is a section; write [{section}] and its keys below")
+    values: dict[str, Any] = {}
+    for section, kind in SECTIONS.items():
+        values[section] = _section(kind, _override(section, kind, raw.get(section, {})), f"{source} [{section}]")
+    for section, kind in TABLES.items():
+        table = raw.get(section, {})
+        values[section] = {name: _section(kind, entry, f"{source} [{section}.{name}]") for name, entry in table.items()}
+    return Settings(source=source, **values)
+
+
+def _override(section: str, kind: type, values: dict) -> dict:
+    values = dict(values)
+    for item in fields(kind):
+        variable = f"VIEWBENCH_{section}_{item.name}".upper()
+        text = os.environ.get(variable)
+        if section == "data" and item.name == "root":
+            text = os.environ.get("VIEWBENCH_DATA", text)
+        if text is not None:
+            wanted = get_type_hints(kind)[item.name]
+            try:
+                values[item.name] = wanted(text)
+            except ValueError:
+                raise UserError(f"{variable} is '{text}', expected {_called(wanted)}") from None
+    return values
+
+
+def _section(kind: type, values: Any, where: str) -> Any:
+    if not isinstance(values, dict):
+        raise UserError(f"{where}: expected a section with keys, got {values!r}")
+    hints = get_type_hints(kind)
+    _known(values, list(hints), where, "key")
+    for name, value in values.items():
+        if not isinstance(value, hints[name]) or isinstance(value, bool):
+            raise UserError(f"{where}: '{name}' is {value!r}, expected {_called(hints[name])}")
+        if isinstance(value, int) and value < (0 if name == "renders" else 1):
+            raise UserError(f"{where}: '{name}' is {value}, expected a positive number")
+        if isinstance(value, list) and not all(isinstance(item, str) for item in value):
+            raise UserError(f"{where}: '{name}' must be a list of strings")
+    try:
+        return kind(**values)
+    except TypeError:
+        missing = [item.name for item in fields(kind) if item.name not in values]
+        raise UserError(f"{where}: '{missing[0]}' is missing") from None
+
+
+def _known(values: dict, known: list[str], where: str, what: str) -> None:
+    for name in values:
+        if name not in known:
+            raise UserError(f"{where}: unknown {what} '{name}'{nearest(name, known)} (known: {', '.join(known)})")
+
+
+def _called(kind: type) -> str:
+    return {str: "a text in quotes", int: "a whole number", list: "a list of texts"}.get(kind, kind.__name__)

@@ -1,0 +1,41 @@
+"""What a selector is given and what it gives back.
+
+A selector is one module of this folder: its docstring's first line is its summary, `SEEDED` says whether the seed
+changes the result, `FACTORS` names the factors of the similarity it uses ("pos", "ang", "sem"), `PARAMETERS` holds
+its parameters with their defaults, and
+
+    select(views: Views, count: int, rng: numpy.random.Generator, **parameters) -> Choice
+
+chooses. It may raise UserError. Everything else (normalisation, features, the count) is decided before it is called.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Views:
+    """The N training views as selection sees them."""
+
+    positions: np.ndarray  # (N, 3) float64, scaled to [-4, 4]
+    rotations: np.ndarray  # (N, 3, 3) float64, camera-to-world
+    features: np.ndarray | None = None  # (N, D) float32 rows of length 1
+    intrinsics: np.ndarray | None = None  # (N, 6) float64: fx, fy, cx, cy, width, height in pixels
+    times: np.ndarray | None = None  # (N,) float64 seconds
+    sharpness: np.ndarray | None = None  # (N,) float64, larger is sharper
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """K chosen views in the order chosen."""
+
+    indices: np.ndarray  # (K,) int64, distinct, into the training views
+    gains: np.ndarray | None = None  # (K,) float64 marginal gain of each pick; None where the selector has none
+    seconds: Mapping[str, float] = field(default_factory=dict)  # {"similarity": ...} where it was timed apart
+    notes: Mapping[str, Any] = field(default_factory=dict)  # what a reader of the result must know, as JSON
