@@ -43,3 +43,17 @@ def summary(package: str, name: str) -> str:
         return ""
     docstring = ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8")))
     return (docstring or "").split("\n", 1)[0]
+
+
+def constant(package: str, name: str, variable: str, default: object = None) -> object:
+    """Value of a literal that the plug-in assigns at its top level, read without importing it."""
+    spec = importlib.util.find_spec(module_name(package, name))
+    if spec is None or spec.origin is None:
+        return default
+    for node in ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body:
+        target = node.target if isinstance(node, ast.AnnAssign) else None
+        if isinstance(node, ast.Assign):
+            target = node.targets[0]
+        if isinstance(target, ast.Name) and target.id == variable and isinstance(node, (ast.Assign, ast.AnnAssign)):
+            return ast.literal_eval(node.value) if node.value is not None else default
+    return default

@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+FACTORS = ("pos", "ang", "sem")  # Dist3D, Ang3D and DistSem of the paper's Table 1, in this order
+
 
 @dataclass(frozen=True)
 class Views:

@@ -1,0 +1,74 @@
+# From a fresh clone: `make reports`, `make test`. Each makes .venv, installs what it needs and runs.
+PYTHON ?= python3
+STUDY ?= quick
+JOBS ?= 2
+VENV := .venv
+BIN := $(VENV)/bin
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check -c constraints.txt
+SOURCES := *.py common scenes selectors backends reports workflow tests
+# One thread a process: the studies and the tests run several processes at once.
+THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
+
+.DEFAULT_GOAL := help
+.PHONY: help setup dev reports dashboard test lint types pytest bench format clean
+
+help:
+	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
+	@echo "make dashboard   MLflow over the runs just made, on http://127.0.0.1:5000"
+	@echo "make test        linters, type checks and tests"
+	@echo "make bench       timings, as ratios measured side by side"
+	@echo "make clean       leaves the clone as it was"
+
+$(VENV)/.installed: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "viewbench needs Python 3.11 or newer; name one with make PYTHON=..."; exit 1; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "Installing viewbench and what it needs into $(VENV) (a minute or two)"
+	@$(PIP) torch torchvision
+	@$(PIP) -e .
+	@$(BIN)/viewbench --version
+	@touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed
+	@$(PIP) -e '.[dev]'
+	@$(BIN)/python -c 'import pytest, ruff, mypy, hypothesis'
+	@touch $@
+
+setup: $(VENV)/.installed
+dev: $(VENV)/.installed-dev
+
+reports: setup
+	@$(THREADS) $(BIN)/snakemake -j$(JOBS) --config study=$(STUDY) -- reports
+	@echo "Open results/$(notdir $(basename $(STUDY)))/reports/index.html"
+
+dashboard: setup
+	$(BIN)/mlflow server --backend-store-uri sqlite:///results/mlflow.db --host 127.0.0.1 --port 5000
+
+test: dev lint types pytest
+
+lint: dev
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/python -m tests.snakemake_lint
+
+# mypy finds a package by the name of its folder; this clone may have any name.
+types: dev
+	@mkdir -p build/types && ln -sfn ../.. build/types/viewbench
+	MYPYPATH=build/types $(BIN)/mypy --cache-dir build/mypy -p viewbench $(foreach folder,common scenes selectors backends reports workflow,-p viewbench.$(folder))
+
+pytest: dev
+	$(THREADS) $(BIN)/python -m pytest -n $(JOBS) $(PYTEST)
+
+bench: dev
+	$(THREADS) $(BIN)/python tests/bench/bench_selectors.py $(BENCH)
+	$(THREADS) $(BIN)/python tests/bench/bench_splat.py $(BENCH)
+
+format: dev
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+	$(BIN)/snakefmt Snakefile workflow
+
+clean:
+	rm -rf $(VENV) results build dist .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

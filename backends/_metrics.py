@@ -1,0 +1,92 @@
+"""PSNR, SSIM and LPIPS of a rendered view, the same for every backend."""
+
+import functools
+import math
+from pathlib import Path
+
+import numpy as np
+
+from viewbench.common.errors import UserError
+
+
+def psnr_db(image: np.ndarray, truth: np.ndarray) -> float:
+    """Peak signal-to-noise ratio in dB, data range 1: -10 log10 of the mean squared error.
+
+    image, truth: (H, W, 3) in [0, 1]. Equal images give infinity. Two images that differ by 0.1 everywhere give 20.
+    """
+    error = float(np.mean((image.astype(np.float64) - truth.astype(np.float64)) ** 2))
+    return math.inf if error == 0 else -10 * math.log10(error)
+
+
+def ssim(image: np.ndarray, truth: np.ndarray) -> float:
+    """Structural similarity (Wang et al. 2004): 11 x 11 Gaussian window, σ = 1.5, mean over pixels and channels.
+
+    image, truth: (H, W, 3) in [0, 1]; images smaller than the window give NaN.
+    """
+    from skimage.metrics import structural_similarity
+
+    if min(truth.shape[:2]) < 11:
+        return math.nan
+    return float(
+        structural_similarity(
+            truth.astype(np.float64),
+            image.astype(np.float64),
+            data_range=1.0,
+            channel_axis=2,
+            gaussian_weights=True,
+            sigma=1.5,
+            use_sample_covariance=False,
+        )
+    )
+
+
+@functools.cache
+def lpips_weights(configured: str) -> Path | None:
+    """File of the AlexNet weights: the configured one, or the one in torch's cache; None without either.
+
+    Raises UserError when a configured file is missing.
+    """
+    if configured:
+        path = Path(configured).expanduser()
+        if not path.is_file():
+            raise UserError(f"metrics.lpips_weights '{configured}' is no file; correct it or leave it empty")
+        return path
+    cached = Path("~/.cache/torch/hub/checkpoints/alexnet-owt-7be5be79.pth").expanduser()
+    return cached if cached.is_file() else None
+
+
+def lpips(image: np.ndarray, truth: np.ndarray, weights: Path) -> float:
+    """Learned perceptual distance (Zhang et al. 2018, AlexNet, version 0.1); lower is nearer.
+
+    image, truth: (H, W, 3) in [0, 1]. `weights` is torchvision's AlexNet file.
+    Raises UserError when the `lpips` package, which carries the linear heads, is not installed.
+    """
+    import torch
+
+    model = _lpips_model(weights)
+    first, second = (
+        torch.from_numpy(np.ascontiguousarray(array.transpose(2, 0, 1))).float()[None] * 2 - 1
+        for array in (image, truth)
+    )
+    with torch.no_grad():
+        return float(model(first, second))
+
+
+@functools.cache
+def _lpips_model(weights: Path):
+    import torch
+
+    from viewbench.common.torchvision_cpu import import_torchvision
+
+    import_torchvision()
+    try:
+        from lpips import LPIPS
+    except ImportError:
+        raise UserError("LPIPS needs the package lpips: pip install 'viewbench[lpips]'") from None
+    model = LPIPS(net="alex", pnet_rand=True, verbose=False).eval()
+    state = torch.load(weights, map_location="cpu", weights_only=True)
+    layers = [model.net.slice1, model.net.slice2, model.net.slice3, model.net.slice4, model.net.slice5]
+    convolutions = {name: layer for part in layers for name, layer in part.named_children() if hasattr(layer, "weight")}
+    for name, layer in convolutions.items():
+        layer.load_state_dict({key: state[f"features.{name}.{key}"] for key in ("weight", "bias")})
+    return model

@@ -1,0 +1,66 @@
+"""Which files of viewbench a step depends on, so that editing one re-runs what it touches and nothing else.
+
+Snakemake sees only files. The sources of a step are the module that does it and, transitively, every viewbench module
+that one imports (at the top or inside a function). Plug-ins are loaded by name, so a step names those it uses.
+"""
+
+import ast
+import functools
+from pathlib import Path
+
+from viewbench.common.settings import PACKAGE
+
+
+def sources(*modules: str) -> list[str]:
+    """Files of the modules ("selectors.maxmin") and of all that they import, sorted, relative to the working folder.
+
+    Raises FileNotFoundError for a module that is not there.
+    """
+    found: set[str] = set()
+    for module in modules:
+        found |= _closure(module)
+    here = Path.cwd()
+    paths = (_file(module) for module in found)
+    return sorted(str(path.relative_to(here) if path.is_relative_to(here) else path) for path in paths if path)
+
+
+@functools.cache
+def _closure(module: str) -> frozenset[str]:
+    if _file(module) is None:
+        raise FileNotFoundError(f"viewbench has no module '{module}'")
+    found, pending = {module}, [module]
+    while pending:
+        for name in _imports(pending.pop()) - found:
+            found.add(name)
+            pending.append(name)
+    return frozenset(found)
+
+
+@functools.cache
+def _imports(module: str) -> frozenset[str]:
+    path = _file(module)
+    if path is None:
+        return frozenset()
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            dotted = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            dotted = [node.module] + [f"{node.module}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        inside = (name.removeprefix("viewbench.") for name in dotted if name.startswith("viewbench."))
+        found |= {name for name in inside if _file(name)}
+    if path.name == "__init__.py":  # a folder is one plug-in: what is in it belongs to it
+        inner = (path.parent / f"{other.stem}.py" for other in path.parent.glob("*.py"))
+        found |= {f"{module}.{other.stem}" for other in inner if other.stem != "__init__"}
+    return frozenset(found)
+
+
+@functools.cache
+def _file(module: str) -> Path | None:
+    path = PACKAGE.joinpath(*module.split("."))
+    for candidate in (path.with_name(path.name + ".py"), path / "__init__.py"):
+        if candidate.is_file():
+            return candidate
+    return None

@@ -1,0 +1,222 @@
+"""Study files: a grid scenes × selectors × ratios × seeds × backends, checked before anything runs."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from viewbench.common import plugins
+from viewbench.common.errors import UserError, nearest
+from viewbench.common.settings import Settings
+from viewbench.selectors._types import FACTORS
+
+FOLDER = Path(__file__).resolve().parent
+STUDIES = FOLDER / "studies"
+REFERENCE = "full"
+
+
+@dataclass(frozen=True)
+class SelectorEntry:
+    """One way of choosing: a selector and its parameters, under the name that results carry."""
+
+    name: str
+    selector: str
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def seeded(self) -> bool:
+        """Whether the seed changes the result; if not, one seed is enough."""
+        if self.parameters.get("start") == "medoid":
+            return False
+        return bool(plugins.constant("selectors", self.selector, "SEEDED", True))
+
+    @property
+    def needs_features(self) -> bool:
+        """Whether the semantic factor is in use."""
+        factors = self.parameters.get("factors", plugins.constant("selectors", self.selector, "FACTORS", ()))
+        return "sem" in tuple(factors)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class BackendEntry:
+    """One way of training: a backend, its options and its budget, under the name that results carry."""
+
+    name: str
+    backend: str
+    iterations: int | None
+    seconds: float | None
+    width: int | None
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study file, checked and with its defaults filled in."""
+
+    name: str
+    title: str
+    description: str
+    scenes: tuple[str, ...]
+    selectors: tuple[SelectorEntry, ...]
+    ratios: tuple[float, ...]
+    seeds: tuple[int, ...]
+    backends: tuple[BackendEntry, ...]
+    reference: bool
+    encoder: str
+    reports: tuple[str, ...]
+    source: Path
+
+    def selector(self, name: str) -> SelectorEntry:
+        """The entry that results call `name`; the full-data reference has one too."""
+        for entry in self.selectors:
+            if entry.name == name:
+                return entry
+        return SelectorEntry(REFERENCE, REFERENCE)
+
+    def backend(self, name: str) -> BackendEntry:
+        """The entry that results call `name`."""
+        return next(entry for entry in self.backends if entry.name == name)
+
+    def cells(self) -> list[dict[str, str]]:
+        """One row a cell, all values as the folders under `cells/` spell them.
+
+        A selector without randomness runs with the first seed only, and the full-data reference once.
+        """
+        rows = []
+        for backend in self.backends:
+            for scene in self.scenes:
+                for entry in self.selectors:
+                    seeds = self.seeds if entry.seeded else self.seeds[:1]
+                    for ratio in self.ratios:
+                        for seed in seeds:
+                            rows.append(_row(backend.name, scene, entry.name, ratio, seed))
+                if self.reference:
+                    rows.append(_row(backend.name, scene, REFERENCE, 1.0, 0))
+        return rows
+
+
+def names() -> list[str]:
+    """The studies that ship, by name."""
+    return sorted(path.stem for path in STUDIES.glob("*.yaml"))
+
+
+def load(study: str, settings: Settings) -> Study:
+    """Reads a study by name or by the path of its file.
+
+    Raises UserError for a file that cannot be read, a key or value that the schema does not allow (with the nearest
+    right one), and a scene, selector, backend or report that does not exist.
+    """
+    import jsonschema
+    import yaml
+
+    path = Path(study) if study.endswith((".yaml", ".yml")) else STUDIES / f"{study}.yaml"
+    try:
+        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError:
+        known = names()
+        raise UserError(f"unknown study '{study}'{nearest(study, known)} (there are: {', '.join(known)})") from None
+    except yaml.YAMLError as error:
+        raise UserError(f"study '{path}' is not valid YAML: {error}") from None
+    schema = json.loads((FOLDER / "schemas" / "study.schema.json").read_text(encoding="utf-8"))
+    errors = list(jsonschema.Draft202012Validator(schema).iter_errors(raw))
+    if errors:
+        raise UserError(f"study '{path}': {_explain(errors[0], schema)}")
+    return _complete(raw, path, settings)
+
+
+def as_json(study: Study) -> dict[str, Any]:
+    """What `results/STUDY/study.json` records."""
+    from dataclasses import asdict
+
+    record = {key: value for key, value in asdict(study).items() if key != "source"}
+    return {"schema": 1, **record, "cells": len(study.cells())}
+
+
+def _row(backend: str, scene: str, selector: str, ratio: float, seed: int) -> dict[str, str]:
+    values = {"backend": backend, "scene": scene, "selector": selector, "ratio": repr(float(ratio)), "seed": str(seed)}
+    return values
+
+
+def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
+    selectors = tuple(_selector(entry) for entry in raw["selectors"])
+    backends = tuple(_backend(entry, raw) for entry in raw["backends"])
+    seeds = raw["seeds"]
+    reports = raw.get("reports", plugins.names("reports"))
+    known_scenes = list(settings.scenes)
+    for scene in raw["scenes"]:
+        if scene not in known_scenes:
+            raise UserError(
+                f"study '{path}': unknown scene '{scene}'{nearest(scene, known_scenes)}; "
+                f"name it in {settings.source} as [scenes.{scene}]"
+            )
+    for report in reports:
+        _known("report", "reports", report, path)
+    for selector in selectors:
+        _known("selector", "selectors", selector.selector, path)
+        factors = selector.parameters.get("factors", FACTORS)
+        for factor in factors:
+            if factor not in FACTORS:
+                raise UserError(f"study '{path}': unknown factor '{factor}'{nearest(factor, FACTORS)}")
+    for backend in backends:
+        _known("backend", "backends", backend.backend.split(":")[0], path)
+        if backend.iterations is None and backend.seconds is None:
+            raise UserError(f"study '{path}': backend '{backend.name}' has no budget; give iterations or seconds")
+    for kind, entries in (("selector", selectors), ("backend", backends)):
+        called = [entry.name for entry in entries]
+        twice = next((name for name in called if called.count(name) > 1), None)
+        if twice is not None or (kind == "selector" and REFERENCE in called):
+            raise UserError(f"study '{path}': {kind} '{twice or REFERENCE}' stands twice; give each its own name")
+    return Study(
+        name=path.stem,
+        title=raw.get("title", path.stem),
+        description=raw.get("description", ""),
+        scenes=tuple(raw["scenes"]),
+        selectors=selectors,
+        ratios=tuple(float(ratio) for ratio in raw["ratios"]),
+        seeds=tuple(range(seeds)) if isinstance(seeds, int) else tuple(seeds),
+        backends=backends,
+        reference=raw.get("reference", True),
+        encoder=raw.get("encoder", settings.features.encoder),
+        reports=tuple(reports),
+        source=path,
+    )
+
+
+def _selector(entry: str | dict) -> SelectorEntry:
+    if isinstance(entry, str):
+        return SelectorEntry(entry, entry)
+    return SelectorEntry(entry.get("name", entry["selector"]), entry["selector"], entry.get("parameters", {}))
+
+
+def _backend(entry: str | dict, raw: dict) -> BackendEntry:
+    entry = {"backend": entry} if isinstance(entry, str) else entry
+    budget = entry.get("budget", raw.get("budget", {}))
+    return BackendEntry(
+        name=entry.get("name", entry["backend"].replace(":", "-")),
+        backend=entry["backend"],
+        iterations=budget.get("iterations"),
+        seconds=budget.get("seconds"),
+        width=entry.get("width", raw.get("width")),
+        options=entry.get("options", {}),
+    )
+
+
+def _known(kind: str, package: str, name: str, path: Path) -> None:
+    known = plugins.names(package)
+    if name not in known:
+        raise UserError(
+            f"study '{path}': unknown {kind} '{name}'{nearest(name, known)} (there are: {', '.join(known)})"
+        )
+
+
+def _explain(error: Any, schema: dict) -> str:
+    """One sentence for a schema error; a wrong key is answered with the nearest right one."""
+    while error.context:  # anyOf: the branch that failed deepest is the one that was meant
+        error = max(error.context, key=lambda inner: len(inner.absolute_path))
+    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error.absolute_path).lstrip(".")
+    if error.validator == "additionalProperties":
+        known = list(error.schema.get("properties", {}))
+        wrong = next(key for key in error.instance if key not in known)
+        place = f" in '{where}'" if where else ""
+        return f"unknown key '{wrong}'{place}{nearest(str(wrong), known)} (known: {', '.join(known)})"
+    return f"{where or 'the file'}: {error.message}"

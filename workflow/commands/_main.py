@@ -1,0 +1,74 @@
+"""The command group: finds commands by file, imports the one that is called, and turns errors into one line."""
+
+import difflib
+import os
+import signal
+import sys
+
+import click
+
+from viewbench import __version__
+from viewbench.common import plugins
+from viewbench.common.errors import UserError
+
+PACKAGE = "workflow.commands"
+
+
+class Commands(click.Group):
+    """Commands by name; a module is imported only when its command runs or prints its own help."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return plugins.names(PACKAGE)
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        return plugins.load(PACKAGE, name).command if name in self.list_commands(context) else None
+
+    def resolve_command(self, context: click.Context, args: list[str]):
+        known = self.list_commands(context)
+        if args and args[0] not in known:
+            close = difflib.get_close_matches(args[0], known, n=1)
+            hint = f"; did you mean '{close[0]}'?" if close else f" (there are: {', '.join(known)})"
+            raise UserError(f"unknown command '{args[0]}'{hint}")
+        return super().resolve_command(context, args)
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, plugins.summary(PACKAGE, name)) for name in self.list_commands(context)])
+
+
+@click.command(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="viewbench")
+def group() -> None:
+    """Choose which views of a capture to train on, train scene models, and compare the ways of choosing."""
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Runs one command and returns the exit status: 0, 2 for a user's mistake, 130 when interrupted."""
+    signal.signal(signal.SIGTERM, _stop)  # so that temporary files are removed on the way out
+    try:
+        group.main(arguments, prog_name="viewbench", standalone_mode=False)
+        sys.stdout.flush()
+    except UserError as error:
+        return _fail(str(error))
+    except click.ClickException as error:
+        return _fail(" ".join(error.format_message().split()))
+    except (KeyboardInterrupt, click.Abort):
+        print("viewbench: stopped", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # the reader of our output has gone, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        if error.errno is None:
+            raise
+        return _fail(f"{error.strerror}: '{error.filename}'" if error.filename else str(error.strerror))
+    return 0
+
+
+def _fail(message: str) -> int:
+    print(f"viewbench: {message}", file=sys.stderr)
+    return 2
+
+
+def _stop(number: int, frame: object) -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,76 @@
+"""Options that several commands share, and the way they show progress."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from viewbench.common.errors import UserError
+
+scene_argument = click.argument("scene")
+format_option = click.option("--format", "format_", metavar="NAME", help="Force a reader (viewbench list formats).")
+holdout_option = click.option(
+    "--holdout", metavar="RULE", help="Test split where the capture has none: every:8, blocks:8 or none."
+)
+encoder_option = click.option("--encoder", metavar="NAME", help="Image encoder (viewbench list encoders).")
+out_option = click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder to write.")
+
+
+def settings_of(values: tuple[str, ...]) -> dict[str, Any]:
+    """`("sigma=0.4", "factors=pos,ang")` as a dictionary of numbers, lists and texts.
+
+    Raises UserError for an item without a key or an equals sign.
+    """
+    result: dict[str, Any] = {}
+    for item in values:
+        key, sign, text = item.partition("=")
+        if not sign or not key.strip():
+            raise UserError(f"--set takes KEY=VALUE, got '{item}'")
+        result[key.strip()] = _value(text.strip())
+    return result
+
+
+def _value(text: str) -> Any:
+    if "," in text:
+        return [_value(part.strip()) for part in text.split(",") if part.strip()]
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(text.lower(), text)
+
+
+def progress(what: str) -> Callable[[int, int | None, str], None]:
+    """Shows progress on stderr: a bar on a terminal, a plain line every tenth otherwise."""
+    if sys.stderr.isatty():
+        return _bar(what)
+    shown = -1
+
+    def line(done: int, total: int | None, text: str = "") -> None:
+        nonlocal shown
+        tenth = 10 * done // total if total else done // 500
+        if tenth > shown:
+            shown = tenth
+            print(f"{what}: {done}{f' of {total}' if total else ''} {text}".rstrip(), file=sys.stderr, flush=True)
+
+    return line
+
+
+def _bar(what: str) -> Callable[[int, int | None, str], None]:
+    from tqdm import tqdm
+
+    bar: tqdm | None = None
+
+    def update(done: int, total: int | None, text: str = "") -> None:
+        nonlocal bar
+        if bar is None:
+            bar = tqdm(total=total, desc=what, file=sys.stderr, leave=False)
+        bar.set_postfix_str(text, refresh=False)
+        bar.update(done - bar.n)
+        if total is not None and done >= total:
+            bar.close()
+
+    return update

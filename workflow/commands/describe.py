@@ -1,0 +1,73 @@
+"""Write what reports need of a scene: its cameras, a sample of its points, its content hash."""
+
+from pathlib import Path
+
+import click
+
+from viewbench.workflow.commands import _options
+
+SAMPLE = 5000  # points kept for the figures
+
+
+@click.command()
+@_options.scene_argument
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="JSON file to write.")
+@click.option("--width", type=click.IntRange(min=16), help="Also write the test images at this width beside it.")
+@_options.format_option
+@_options.holdout_option
+def command(scene: str, out: Path, width: int | None, format_: str | None, holdout: str | None) -> None:
+    """Write positions and viewing directions of both splits of SCENE as JSON."""
+    import numpy as np
+
+    from viewbench.common import settings as settings_file
+    from viewbench.common.files import write_json
+    from viewbench.scenes.digest import scene_sha256
+    from viewbench.scenes.load import open_scene
+    from viewbench.scenes.types import Split
+
+    settings = settings_file.load()
+    opened = open_scene(scene, settings, format=format_, holdout=holdout)
+    entry = settings.scenes.get(scene)
+
+    def split(part: Split) -> dict:
+        return {
+            "names": part.names,
+            "positions": np.round(part.cameras.positions, 5),
+            "forward": np.round(part.cameras.forward, 5),
+        }
+
+    points = None
+    if opened.points is not None and len(opened.points):
+        step = max(1, len(opened.points) // SAMPLE)
+        points = np.hstack([np.round(opened.points.xyz[::step], 3), opened.points.rgb[::step]])[:SAMPLE]
+    if width is not None:
+        _write_truth(opened.test, width, out.with_suffix(""))
+    record = {
+        "schema": 1,
+        "scene": opened.name,
+        "dataset": (entry.dataset if entry else "") or opened.name,
+        "format": opened.format,
+        "holdout": opened.holdout,
+        "n_train": len(opened.train),
+        "n_test": len(opened.test),
+        "width": int(opened.train.cameras.width[0]),
+        "height": int(opened.train.cameras.height[0]),
+        "sha256": scene_sha256(opened),
+        "notes": opened.notes,
+        "train": split(opened.train),
+        "test": split(opened.test),
+        "points": points,
+    }
+    write_json(out, record)
+
+
+def _write_truth(test, width: int, folder: Path) -> None:
+    """The test images as they are compared with, for the pictures in the reports."""
+    import numpy as np
+
+    from viewbench.backends._evaluate import file_stem, save_png, to_uint8
+    from viewbench.scenes.images import load_images
+
+    images, _ = load_images(test, np.arange(len(test)), width)
+    for number, (name, image) in enumerate(zip(test.names, images, strict=True)):
+        save_png(to_uint8(image, image.shape, name), folder / f"{number:04d}_{file_stem(name)}.png")

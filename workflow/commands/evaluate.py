@@ -1,0 +1,29 @@
+"""Render the test split with a trained model and score it."""
+
+from pathlib import Path
+
+import click
+
+from viewbench.workflow.commands import _options
+
+
+@click.command()
+@click.argument("model", type=click.Path(path_type=Path))
+@_options.scene_argument
+@_options.out_option
+@_options.format_option
+@_options.holdout_option
+def command(model: Path, scene: str, out: Path, format_: str | None, holdout: str | None) -> None:
+    """Render the test views of SCENE with the model in the folder MODEL; write metrics.json and the renders."""
+    from viewbench.backends._evaluate import evaluate
+    from viewbench.common import settings as settings_file
+    from viewbench.scenes.load import open_scene
+
+    settings = settings_file.load()
+    opened = open_scene(scene, settings, format=format_, holdout=holdout)
+    record = evaluate(model, opened, out, settings=settings, progress=_options.progress("evaluate"))
+    text = [f"{len(record['views'])} test views"]
+    for metric, unit in (("psnr_db", " dB PSNR"), ("ssim", " SSIM"), ("lpips", " LPIPS")):
+        if record[metric] is not None:
+            text.append(f"{record[metric]:.3f}{unit}")
+    click.echo(", ".join(text))

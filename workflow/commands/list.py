@@ -1,0 +1,77 @@
+"""List scenes, formats, selectors, encoders, backends, reports or studies."""
+
+import click
+
+KINDS = ("scenes", "formats", "selectors", "encoders", "backends", "reports", "studies")
+
+
+@click.command()
+@click.argument("kind", type=click.Choice(KINDS))
+def command(kind: str) -> None:
+    """Print what there is of KIND, one line each, and why something is unavailable."""
+    rows = {"scenes": _scenes, "backends": _backends, "studies": _studies}.get(kind, lambda: _plugins(kind))()
+    width = max((len(name) for name, _ in rows), default=0)
+    for name, text in rows:
+        click.echo(f"{name:<{width}}  {text}".rstrip())
+
+
+def _plugins(kind: str) -> list[tuple[str, str]]:
+    from viewbench.common import plugins
+
+    package = {"formats": "scenes.formats", "encoders": "scenes.encoders"}.get(kind, kind)
+    rows = []
+    for name in plugins.names(package):
+        reason = None
+        if kind == "encoders":
+            reason = getattr(plugins.load(package, name), "available", lambda: None)()
+        rows.append((name, plugins.summary(package, name) + (f" [unavailable: {reason}]" if reason else "")))
+    return rows
+
+
+def _scenes() -> list[tuple[str, str]]:
+    from viewbench.common import settings as settings_file
+    from viewbench.common.errors import UserError
+    from viewbench.scenes.load import open_scene
+
+    settings = settings_file.load()
+    rows = []
+    for name, entry in settings.scenes.items():
+        try:
+            scene = open_scene(name, settings)
+            text = f"{len(scene.train)} training and {len(scene.test)} test views, {scene.format} ({entry.path})"
+        except UserError as error:
+            text = f"[unavailable: {error}]"
+        rows.append((name, text))
+    return rows
+
+
+def _backends() -> list[tuple[str, str]]:
+    from viewbench.backends import _registry
+    from viewbench.common import plugins
+    from viewbench.common import settings as settings_file
+
+    settings = settings_file.load()
+    rows = []
+    for name in _registry.names(settings):
+        about = plugins.summary("backends", name.split(":")[0])
+        backend = _registry.load(name, settings)
+        reason = backend.available()
+        state = f"[unavailable: {reason}]" if reason else f"[{backend.version()}, {backend.CAPABILITIES.device}]"
+        rows.append((name, f"{about} {state}"))
+    return rows
+
+
+def _studies() -> list[tuple[str, str]]:
+    from viewbench.common import settings as settings_file
+    from viewbench.common.errors import UserError
+    from viewbench.workflow import _study
+
+    settings = settings_file.load()
+    rows = []
+    for name in _study.names():
+        try:
+            study = _study.load(name, settings)
+            rows.append((name, f"{study.title} ({len(study.cells())} cells)"))
+        except UserError as error:
+            rows.append((name, f"[unavailable: {error}]"))
+    return rows

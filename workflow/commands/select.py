@@ -1,0 +1,82 @@
+"""Choose views of a capture and write them as a capture of the same format."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from viewbench.workflow.commands import _options
+
+
+@click.command()
+@_options.scene_argument
+@click.option("--out", type=click.Path(path_type=Path), help="Folder to write the chosen subset to.")
+@click.option("--selector", default="maxmin", show_default=True, help="Way of choosing (viewbench list selectors).")
+@click.option("--ratio", type=float, help="Share of the training views, in (0, 1].")
+@click.option("--count", type=int, help="Number of views, instead of --ratio.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the choice.")
+@click.option("--alpha", type=float, help="Weight of the position factor; 0.7.")
+@click.option("--beta", type=float, help="Weight of the rotation factor; 0.2. The semantic one gets the rest.")
+@click.option("--sigma", type=float, help="Width of the position factor, positions scaled to [-4, 4]; 0.5.")
+@click.option("--factors", help="Factors to use, of pos,ang,sem.")
+@click.option("--features", type=click.Path(path_type=Path), help="Your own N x D features (.npy).")
+@_options.encoder_option
+@click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
+@click.option("--dry-run", is_flag=True, help="Choose and print, write nothing.")
+@click.option("--selection", type=click.Path(path_type=Path), help="Write only selection.json, to this file.")
+@click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
+@click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
+@_options.format_option
+@_options.holdout_option
+def command(**given: Any) -> None:
+    """Choose views of SCENE and write them to --out, in the format that was read, with selection.json."""
+    from viewbench.common import settings as settings_file
+    from viewbench.common.errors import UserError
+    from viewbench.common.files import write_json
+    from viewbench.scenes.load import open_scene
+    from viewbench.selectors import _run
+
+    if (given["ratio"] is None) == (given["count"] is None):
+        raise UserError("give either --ratio or --count")
+    if not (given["out"] or given["selection"] or given["dry_run"]):
+        raise UserError("give --out FOLDER, or --dry-run to see the choice without writing it")
+    settings = settings_file.load()
+    scene = open_scene(given["scene"], settings, format=given["format_"], holdout=given["holdout"])
+    n = len(scene.train)
+    count = given["count"] if given["ratio"] is None else _run.count_of(given["ratio"], n)
+    parameters = _options.settings_of(given["options"])
+    parameters |= {key: given[key] for key in ("alpha", "beta", "sigma") if given[key] is not None}
+    if given["factors"] is not None:
+        parameters["factors"] = [part.strip() for part in given["factors"].split(",") if part.strip()]
+    if isinstance(parameters.get("factors"), str):
+        parameters["factors"] = [parameters["factors"]]
+    features = _features(scene, given, parameters, settings)
+    record = _run.run(scene, given["selector"], count, given["seed"], parameters, features)
+    if given["selection"]:
+        write_json(given["selection"], record)
+    if given["out"] and not given["dry_run"]:
+        from viewbench.scenes.subset import write_subset
+
+        write_subset(scene, record, given["out"], copy=given["copy"], force=given["force"])
+    if given["dry_run"] or not given["selection"]:
+        for name in record["names"]:
+            click.echo(name)
+
+
+def _features(scene: Any, given: dict[str, Any], parameters: dict[str, Any], settings: Any) -> Any:
+    """The features that the selector needs: the user's own, the cached ones, or None without the semantic factor."""
+    from viewbench.common import plugins
+
+    if given["features"] is not None:
+        from viewbench.scenes.features import load_user_features
+
+        return load_user_features(given["features"], len(scene.train))
+    plugins.load("selectors", given["selector"])
+    factors = parameters.get("factors", plugins.constant("selectors", given["selector"], "FACTORS", ()))
+    encoder = given["encoder"] or settings.features.encoder
+    if "sem" not in tuple(factors) or encoder == "none":
+        return None
+    from viewbench.scenes.features import features
+
+    cache = Path(settings.features.cache)
+    return features(scene.train, encoder, cache, settings.features.batch, _options.progress("features"))

@@ -1,0 +1,95 @@
+# What is done with the finished cells.
+
+METRICS = expand(f"{RESULTS}/cells/{{cell}}/metrics.json", cell=CELLS.instance_patterns)
+
+
+rule collect:
+    input:
+        cells=METRICS,
+        scenes=expand(f"{RESULTS}/scenes/{{scene}}.json", scene=STUDY.scenes),
+        study=f"{RESULTS}/study.json",
+        sources=WIRING.sources("workflow.commands.collect"),
+    output:
+        f"{RESULTS}/results.csv",
+    localrule: True
+    params:
+        study=GIVEN,
+        results=Path(RESULTS).parent,
+    shell:
+        "viewbench collect {params.study:q} --results {params.results:q} > /dev/null"
+
+
+rule track_cell:
+    input:
+        f"{CELL}/metrics.json",
+        WIRING.sources("workflow.commands.track"),
+    output:
+        f"{RESULTS}/tracked/{CELLS.wildcard_pattern}.json",
+    log:
+        f"{RESULTS}/logs/track/{CELLS.wildcard_pattern}.log",
+    params:
+        study=GIVEN,
+        results=Path(RESULTS).parent,
+        cell=CELLS.wildcard_pattern,
+    shell:
+        "viewbench track {params.study:q} --results {params.results:q} --cell {params.cell:q}"
+        " --stamp {output:q} 2> {log:q}"
+
+
+# A server gets every cell as it is finished; a database beside the results gets them all at once at the end, since
+# opening it costs seconds and several jobs must not open a fresh one together.
+rule track:
+    input:
+        results=f"{RESULTS}/results.csv",
+        cells=(
+            expand(f"{RESULTS}/tracked/{{cell}}.json", cell=CELLS.instance_patterns)
+            if WIRING.tracks_as_it_goes
+            else []
+        ),
+        sources=WIRING.sources("workflow.commands.track"),
+    output:
+        f"{RESULTS}/tracked.json",
+    log:
+        f"{RESULTS}/logs/track.log",
+    params:
+        study=GIVEN,
+        results=Path(RESULTS).parent,
+    shell:
+        "viewbench track {params.study:q} --results {params.results:q} --stamp {output:q} 2> {log:q}"
+
+
+rule report:
+    input:
+        f"{RESULTS}/results.csv",
+        f"{RESULTS}/study.json",
+        WIRING.report_sources,
+    output:
+        f"{RESULTS}/reports/{{report}}.items.json",
+    log:
+        f"{RESULTS}/logs/report/{{report}}.log",
+    params:
+        folder=RESULTS,
+    shell:
+        "viewbench report {params.folder:q} --only {wildcards.report:q} > /dev/null 2> {log:q}"
+
+
+rule page:
+    input:
+        expand(f"{RESULTS}/reports/{{report}}.items.json", report=STUDY.reports),
+        WIRING.sources("workflow.commands.report", "reports._page"),
+        WIRING.templates,
+    output:
+        f"{RESULTS}/reports/index.html",
+    log:
+        f"{RESULTS}/logs/report/page.log",
+    params:
+        folder=RESULTS,
+    shell:
+        "viewbench report {params.folder:q} --page > /dev/null 2> {log:q}"
+
+
+rule reports:
+    default_target: True
+    input:
+        f"{RESULTS}/reports/index.html",
+        f"{RESULTS}/tracked.json",

@@ -1,0 +1,58 @@
+# What is done once a scene, and once a study.
+
+
+rule study:
+    input:
+        STUDY.source,
+        WIRING.sources("workflow.commands.study"),
+    output:
+        f"{RESULTS}/study.json",
+    localrule: True
+    params:
+        study=GIVEN,
+    shell:
+        "viewbench study {params.study:q} --out {output:q}"
+
+
+rule describe:
+    input:
+        scene=WIRING.scene_files,
+        sources=WIRING.sources("workflow.commands.describe"),
+    output:
+        f"{RESULTS}/scenes/{{scene}}.json",
+    log:
+        f"{RESULTS}/logs/describe/{{scene}}.log",
+    params:
+        width=WIRING.truth_width,
+    shell:
+        "viewbench describe {wildcards.scene:q} --width {params.width} --out {output:q} 2> {log:q}"
+
+
+rule features:
+    input:
+        scene=f"{RESULTS}/scenes/{{scene}}.json",
+        sources=WIRING.sources("workflow.commands.features", WIRING.encoder_module),
+    output:
+        f"{RESULTS}/features/{{scene}}.npy",
+    log:
+        f"{RESULTS}/logs/features/{{scene}}.log",
+    benchmark:
+        f"{RESULTS}/benchmarks/features/{{scene}}.tsv"
+    threads: SETTINGS.compute.threads
+    params:
+        encoder=STUDY.encoder,
+    shell:
+        "viewbench features {wildcards.scene:q} --encoder {params.encoder:q} --out {output:q} 2> {log:q}"
+
+
+rule warm:
+    input:
+        WIRING.backend_sources,
+    output:
+        touch(f"{RESULTS}/warm/{{backend}}"),
+    log:
+        f"{RESULTS}/logs/warm/{{backend}}.log",
+    params:
+        backend=lambda wildcards: STUDY.backend(wildcards.backend).backend,
+    shell:
+        "viewbench warm --backend {params.backend:q} 2> {log:q}"
