@@ -55,7 +55,7 @@ lint: dev
 # mypy finds a package by the name of its folder; this clone may have any name.
 types: dev
 	@mkdir -p build/types && ln -sfn ../.. build/types/viewbench
-	MYPYPATH=build/types $(BIN)/mypy --cache-dir build/mypy -p viewbench $(foreach folder,common scenes selectors backends reports workflow,-p viewbench.$(folder))
+	cd build/types && MYPYPATH=. ../../$(BIN)/mypy --config-file ../../pyproject.toml --cache-dir ../mypy viewbench/*.py $(addprefix viewbench/,common scenes selectors backends reports workflow)
 
 pytest: dev
 	$(THREADS) $(BIN)/python -m pytest -n $(JOBS) $(PYTEST)

@@ -49,7 +49,7 @@ def evaluate(
     temporary = out / ".renders"
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir(parents=True)
-    views = []
+    views: list[dict[str, Any]] = []
     try:
         for number, (name, image) in enumerate(zip(scene.test.names, backend.render(model, cameras), strict=True)):
             pixels = to_uint8(image, truth[number].shape, name)
@@ -104,6 +104,6 @@ def file_stem(name: str) -> str:
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in stem.replace("/", "__")) or "_"
 
 
-def _mean(values: list[float | None]) -> float | None:
+def _mean(values: list[Any]) -> float | None:
     known = [value for value in values if value is not None and math.isfinite(value)]
     return float(np.mean(known)) if len(known) == len(values) and known else None

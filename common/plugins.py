@@ -51,9 +51,12 @@ def constant(package: str, name: str, variable: str, default: object = None) -> 
     if spec is None or spec.origin is None:
         return default
     for node in ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body:
-        target = node.target if isinstance(node, ast.AnnAssign) else None
         if isinstance(node, ast.Assign):
-            target = node.targets[0]
-        if isinstance(target, ast.Name) and target.id == variable and isinstance(node, (ast.Assign, ast.AnnAssign)):
-            return ast.literal_eval(node.value) if node.value is not None else default
+            targets, value = node.targets, node.value
+        elif isinstance(node, ast.AnnAssign) and node.value is not None:
+            targets, value = [node.target], node.value
+        else:
+            continue
+        if any(isinstance(target, ast.Name) and target.id == variable for target in targets):
+            return ast.literal_eval(value)
     return default

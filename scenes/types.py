@@ -34,7 +34,7 @@ class Cameras:
     def __getitem__(self, index: Any) -> "Cameras":
         if isinstance(index, (int, np.integer)):
             index = [index]
-        arrays = {name: None if value is None else value[index] for name, value in vars(self).items()}
+        arrays: dict[str, Any] = {name: None if value is None else value[index] for name, value in vars(self).items()}
         return Cameras(**arrays)
 
     def __iter__(self) -> Iterator["Cameras"]:

@@ -33,8 +33,8 @@ class SelectorEntry:
     @property
     def needs_features(self) -> bool:
         """Whether the semantic factor is in use."""
-        factors = self.parameters.get("factors", plugins.constant("selectors", self.selector, "FACTORS", ()))
-        return "sem" in tuple(factors)  # type: ignore[arg-type]
+        factors: Any = self.parameters.get("factors", plugins.constant("selectors", self.selector, "FACTORS", ()))
+        return "sem" in tuple(factors)
 
 
 @dataclass(frozen=True)

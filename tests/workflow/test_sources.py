@@ -1,0 +1,66 @@
+import subprocess
+import sys
+
+import pytest
+
+from viewbench.common import plugins
+from viewbench.common.settings import PACKAGE
+from viewbench.workflow import _sources
+
+
+def files(*modules):
+    return {str(path).removeprefix(str(PACKAGE) + "/") for path in _sources.sources(*modules)}
+
+
+@pytest.mark.parametrize("selector", plugins.names("selectors"))
+def test_a_selector_depends_on_itself_and_no_other_selector(selector):
+    module = f"selectors.{selector.replace('-', '_')}"
+    found = files("workflow.commands.select", module)
+    plugin_files = {f"selectors/{name.replace('-', '_')}.py" for name in plugins.names("selectors")}
+    assert found & plugin_files == {f"selectors/{selector.replace('-', '_')}.py"}
+
+
+def test_training_does_not_depend_on_selectors_or_reports():
+    found = files("workflow.commands.train", "backends.splat")
+    assert "backends/splat/__init__.py" in found
+    assert "backends/_train.py" in found
+    assert not any(name.startswith(("reports/", "selectors/")) for name in found)
+
+
+def test_reports_do_not_depend_on_what_made_the_results():
+    for name in plugins.names("reports"):
+        found = files("reports._run", f"reports.{name}")
+        assert not any(name.startswith(("backends/", "selectors/", "workflow/")) for name in found)
+
+
+def test_data_flows_one_way():
+    order = ["common", "scenes", "selectors", "backends", "reports", "workflow"]
+    for number, folder in enumerate(order):
+        for path in (PACKAGE / folder).rglob("*.py"):
+            module = ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
+            for imported in _sources._imports(module):
+                first = imported.split(".")[0]
+                assert order.index(first) <= number, f"{module} imports {imported}, which is to its right"
+
+
+def test_what_is_declared_is_what_is_imported():
+    """The modules that a real run loads are among the declared ones (plug-ins loaded by name aside)."""
+    code = """
+import sys
+from viewbench.workflow.commands import _main
+assert _main.run(["select", "room_human", "--ratio", "0.05", "--selector", "uniform", "--dry-run"]) == 0
+print(*[name for name in sys.modules if name.startswith("viewbench.")], file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=PACKAGE, check=True)
+    loaded = {name.removeprefix("viewbench.") for name in done.stderr.split()}
+    declared = {
+        ".".join(_sources.Path(path).with_suffix("").parts).removesuffix(".__init__")
+        for path in files("workflow.commands.select", "selectors.uniform")
+    }
+    undeclared = {name for name in loaded - declared if _sources._file(name)}
+    assert {name for name in undeclared if not name.startswith("scenes.formats.")} <= {"workflow.commands._main"}
+
+
+def test_an_unknown_module_is_an_error():
+    with pytest.raises(FileNotFoundError):
+        _sources.sources("selectors.nothing")

@@ -1,0 +1,91 @@
+import pytest
+import yaml
+
+from viewbench.common import settings as settings_file
+from viewbench.common.errors import UserError
+from viewbench.workflow import _study
+
+GRID = {
+    "scenes": ["room_human", "room_smooth"],
+    "selectors": ["random", "coverage", {"name": "places", "selector": "maxmin", "parameters": {"factors": ["pos"]}}],
+    "ratios": [0.05, 0.2],
+    "seeds": 3,
+    "backends": ["splat"],
+    "budget": {"iterations": 10},
+}
+
+
+@pytest.fixture
+def load(tmp_path):
+    settings = settings_file.load(settings_file.PACKAGE / settings_file.FILE)
+
+    def read(**changes):
+        path = tmp_path / "mine.yaml"
+        raw = {key: value for key, value in {**GRID, **changes}.items() if value is not None}
+        path.write_text(yaml.safe_dump(raw), encoding="utf-8")
+        return _study.load(str(path), settings)
+
+    return read
+
+
+@pytest.mark.parametrize("name", _study.names())
+def test_the_studies_that_ship_are_valid(name):
+    study = _study.load(name, settings_file.load(settings_file.PACKAGE / settings_file.FILE))
+    assert study.cells()
+
+
+def test_the_grid_is_complete_and_has_nothing_twice(load):
+    study = load()
+    cells = study.cells()
+    keys = {tuple(cell.values()) for cell in cells}
+    assert len(keys) == len(cells)
+    # per scene: (random + places) x 2 ratios x 3 seeds, coverage x 2 ratios x 1 seed, and the full-data reference
+    assert len(cells) == 2 * (2 * 2 * 3 + 1 * 2 * 1 + 1)
+    assert {cell["seed"] for cell in cells if cell["selector"] == "coverage"} == {"0"}
+    assert [(cell["ratio"], cell["seed"]) for cell in cells if cell["selector"] == "full"] == [("1.0", "0")] * 2
+
+
+def test_only_selectors_that_use_semantics_need_features(load):
+    study = load()
+    assert not study.selector("places").needs_features
+    assert not study.selector("random").needs_features
+    assert load(selectors=["maxmin"]).selector("maxmin").needs_features
+
+
+def test_a_backend_entry_may_have_its_own_budget_and_width(load):
+    study = load(backends=["splat", {"name": "long", "backend": "splat", "budget": {"seconds": 2}, "width": 64}])
+    assert (study.backend("splat").iterations, study.backend("splat").seconds) == (10, None)
+    assert (study.backend("long").iterations, study.backend("long").seconds) == (None, 2)
+    assert study.backend("long").width == 64
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"ratois": [0.1]}, "unknown key 'ratois'; did you mean 'ratios'"),
+        ({"budget": {"iteration": 5}}, "unknown key 'iteration' in 'budget'; did you mean 'iterations'"),
+        ({"selectors": [{"selector": "maxmin", "parameter": {}}]}, "did you mean 'parameters'"),
+        ({"scenes": ["room_humna"]}, "did you mean 'room_human'"),
+        ({"selectors": ["maxmim"]}, "did you mean 'maxmin'"),
+        ({"selectors": [{"selector": "maxmin", "parameters": {"factors": ["post"]}}]}, "did you mean 'pos'"),
+        ({"backends": ["splatt"]}, "did you mean 'splat'"),
+        ({"reports": ["camera"]}, "did you mean 'cameras'"),
+        ({"selectors": ["maxmin", "maxmin"]}, "stands twice"),
+        ({"selectors": ["full"]}, "stands twice"),
+        ({"ratios": [0]}, "ratios"),
+        ({"ratios": [1.5]}, "ratios"),
+        ({"seeds": 0}, "seeds"),
+        ({"scenes": None}, "'scenes' is a required property"),
+        ({"budget": None}, "has no budget"),
+        ({"width": 2}, "width"),
+        ({"scenes": ["../x"]}, "does not match"),
+    ],
+)
+def test_a_mistake_is_named(load, changes, words):
+    with pytest.raises(UserError, match=words.replace("[", r"\[")):
+        load(**changes)
+
+
+def test_an_unknown_study_is_answered_with_the_nearest():
+    with pytest.raises(UserError, match="did you mean 'quick'"):
+        _study.load("quik", settings_file.load())
