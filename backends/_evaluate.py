@@ -11,11 +11,13 @@ import numpy as np
 
 from viewbench import __version__
 from viewbench.backends import _registry
-from viewbench.backends._metrics import lpips, lpips_weights, psnr_db, ssim
+from viewbench.backends._metrics import lpips, lpips_weights, ssim
+from viewbench.backends._psnr import psnr_db
 from viewbench.common.errors import UserError
-from viewbench.common.files import finite_or_none, read_json, whole, write_json
+from viewbench.common.files import finite_or_none, read_json, write_json
 from viewbench.common.settings import Settings
 from viewbench.scenes.images import load_images
+from viewbench.scenes.pictures import picture_name, save_png, to_uint8
 from viewbench.scenes.types import Scene
 
 
@@ -53,7 +55,7 @@ def evaluate(
     try:
         for number, (name, image) in enumerate(zip(scene.test.names, backend.render(model, cameras), strict=True)):
             pixels = to_uint8(image, truth[number].shape, name)
-            file = f"{number:04d}_{file_stem(name)}.png"
+            file = picture_name(number, name)
             save_png(pixels, temporary / file)
             rendered = pixels.astype(np.float32) / 255
             views.append(
@@ -79,29 +81,6 @@ def evaluate(
     }
     write_json(out / "metrics.json", record)
     return record
-
-
-def to_uint8(image: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """(H, W, 3) uint8 of an image in [0, 1], rounded. Raises UserError for another shape or NaN."""
-    if image.shape != shape:
-        raise UserError(f"the backend rendered test view '{name}' as {image.shape}, expected {shape}")
-    if not np.isfinite(image).all():
-        raise UserError(f"the backend's render of test view '{name}' has NaN or infinite pixels")
-    return np.round(np.clip(image, 0, 1) * 255).astype(np.uint8)
-
-
-def save_png(pixels: np.ndarray, path: Path) -> None:
-    """Writes (H, W, 3) uint8 as PNG, whole or not at all."""
-    from PIL import Image
-
-    with whole(path) as temporary:
-        Image.fromarray(pixels).save(temporary, format="PNG", compress_level=4)
-
-
-def file_stem(name: str) -> str:
-    """A frame name as the readable part of a file name: no folders, no suffix, nothing that a system minds."""
-    stem = name.rsplit(".", 1)[0] if "." in name.rsplit("/", 1)[-1] else name
-    return "".join(c if c.isalnum() or c in "-_." else "_" for c in stem.replace("/", "__")) or "_"
 
 
 def _mean(values: list[Any]) -> float | None:

@@ -1,4 +1,4 @@
-"""PSNR, SSIM and LPIPS of a rendered view, the same for every backend."""
+"""SSIM and LPIPS of a rendered view, the same for every backend."""
 
 import functools
 import math
@@ -7,15 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from viewbench.common.errors import UserError
-
-
-def psnr_db(image: np.ndarray, truth: np.ndarray) -> float:
-    """Peak signal-to-noise ratio in dB, data range 1: -10 log10 of the mean squared error.
-
-    image, truth: (H, W, 3) in [0, 1]. Equal images give infinity. Two images that differ by 0.1 everywhere give 20.
-    """
-    error = float(np.mean((image.astype(np.float64) - truth.astype(np.float64)) ** 2))
-    return math.inf if error == 0 else -10 * math.log10(error)
 
 
 def ssim(image: np.ndarray, truth: np.ndarray) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from viewbench import __version__
 from viewbench.backends import _registry
+from viewbench.backends._psnr import psnr_db
 from viewbench.backends._types import Budget, Probe, Report, Trained, TrainingSet
 from viewbench.common.errors import UserError, nearest
 from viewbench.common.files import read_json, write_json
@@ -162,8 +163,6 @@ def _probe(scene: Scene, width: int | None) -> Probe:
     truth, cameras = load_images(scene.test, chosen, width)
 
     def probe(render: Callable[[Cameras], Any]) -> float:
-        from viewbench.backends._metrics import psnr_db
-
         values = [psnr_db(np.clip(image, 0, 1), view) for image, view in zip(render(cameras), truth, strict=True)]
         return float(np.mean(values))
 

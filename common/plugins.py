@@ -23,8 +23,12 @@ def names(package: str) -> list[str]:
 
 
 def load(package: str, name: str) -> ModuleType:
-    """Imports one plug-in. Raises UserError, which names the nearest right one, when there is none such."""
+    """Imports one plug-in; `_` and `-` in its name are the same.
+
+    Raises UserError, which names the nearest right one, when there is none such.
+    """
     known = names(package)
+    name = name.replace("_", "-")
     if name not in known:
         kind = package.rsplit(".", 1)[-1].rstrip("s")
         raise UserError(f"unknown {kind} '{name}'{nearest(name, known)} (there are: {', '.join(known)})")

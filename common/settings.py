@@ -62,6 +62,9 @@ class Command:
     render: list = field(default_factory=list)
     format: str = "transforms"
     output: str = "{name}.png"
+    version: list = field(default_factory=list)
+    device: str = "cpu"
+    timeout: int = 0  # seconds, 0 for none
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,8 @@ import json
 import subprocess
 import sys
 
-# Software is installed once, by pip; paths are absolute where the results folder is the user's choice.
-UNFITTING = {
-    "Missing software definition",
-    "No log directive defined",
-    "Do not access input and output files individually by index in shell commands",
-}
+# Software is installed once, by pip, into the environment that runs Snakemake.
+UNFITTING = {"Specify a conda environment or container for each rule."}
 
 
 def main() -> int:
@@ -25,8 +21,8 @@ def main() -> int:
     left = 0
     for part in [*advice.get("rules", []), *advice.get("snakefiles", [])]:
         for lint in part["lints"]:
-            if lint["title"].split(":")[0].strip() not in UNFITTING:
-                print(f"{part.get('name', 'Snakefile')}: {lint['title']}: {lint['body']}")
+            if lint["title"].strip().rstrip(":") not in UNFITTING:
+                print(f"{part.get('name', 'Snakefile')}: {lint['title']} {lint['body']}")
                 left += 1
     return left
 

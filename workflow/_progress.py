@@ -104,7 +104,7 @@ class Progress(logging.Handler):
 
 def attach(workflow: Any, cells: int) -> None:
     """Adds the progress line to a real run of the main process, and silences the chatter around it."""
-    if workflow.dryrun or not workflow.is_main_process:
+    if workflow.output_settings.dryrun or not workflow.is_main_process:
         return
     from snakemake.logging import logger
 
@@ -117,9 +117,10 @@ def attach(workflow: Any, cells: int) -> None:
 
 
 def _worth_reading(record: logging.LogRecord) -> bool:
-    if getattr(record, "event", None) is not None or record.levelno >= logging.WARNING:
-        return True
-    return "Nothing to be done" in str(record.msg)
+    """Of what Snakemake itself would print: warnings, errors without a job (those of jobs are ours), and the end."""
+    if getattr(record, "event", None) is not None:
+        return False
+    return record.levelno >= logging.WARNING or "Nothing to be done" in str(record.msg)
 
 
 def salvage(study: Any, given: str) -> None:

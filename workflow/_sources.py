@@ -19,9 +19,14 @@ def sources(*modules: str) -> list[str]:
     found: set[str] = set()
     for module in modules:
         found |= _closure(module)
-    here = Path.cwd()
     paths = (_file(module) for module in found)
-    return sorted(str(path.relative_to(here) if path.is_relative_to(here) else path) for path in paths if path)
+    return sorted(from_here(path) for path in paths if path)
+
+
+def from_here(path: Path) -> str:
+    """The path relative to the working folder where it is inside, so that a clone that moves is not run again."""
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)
 
 
 @functools.cache

@@ -141,7 +141,7 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
     selectors = tuple(_selector(entry) for entry in raw["selectors"])
     backends = tuple(_backend(entry, raw) for entry in raw["backends"])
     seeds = raw["seeds"]
-    reports = raw.get("reports", plugins.names("reports"))
+    reports = [name.replace("_", "-") for name in raw.get("reports", plugins.names("reports"))]
     known_scenes = list(settings.scenes)
     for scene in raw["scenes"]:
         if scene not in known_scenes:

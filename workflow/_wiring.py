@@ -16,7 +16,7 @@ from viewbench.common import plugins
 from viewbench.common.errors import UserError
 from viewbench.common.settings import PACKAGE, Settings
 from viewbench.reports._tracking import is_remote
-from viewbench.workflow._sources import sources
+from viewbench.workflow._sources import from_here, sources
 from viewbench.workflow._study import Study
 
 
@@ -54,6 +54,11 @@ class Wiring:
         """Files that a step made of these modules depends on."""
         return sources(*modules)
 
+    @property
+    def study_file(self) -> str:
+        """The file that the study was read from."""
+        return from_here(self.study.source)
+
     def alternatives(self, column: str) -> str:
         """Regular expression of the values that a wildcard can take."""
         values = self.study.reports if column == "report" else sorted(set(self.cells.dataframe[column]))
@@ -66,9 +71,9 @@ class Wiring:
 
             with explained():
                 scene = open_scene(wildcards.scene, self.settings)
-            images = (str(path) for split in (scene.train, scene.test) for path in split.paths)
+            images = [path for split in (scene.train, scene.test) for path in split.paths]
             reader = sources(plugins.module_name("scenes.formats", scene.format).removeprefix("viewbench."))
-            self._files[wildcards.scene] = [*map(str, scene.files), *images, *reader]
+            self._files[wildcards.scene] = [*map(from_here, [*scene.files, *images]), *reader]
         return self._files[wildcards.scene]
 
     @cached_property
@@ -108,10 +113,17 @@ class Wiring:
             options += ["--encoder", "none"]
         return shlex.join(options)
 
+    def _backend_module(self, wildcards: Any) -> str:
+        family = self.study.backend(wildcards.backend).backend.split(":")[0]
+        return plugins.module_name("backends", family).removeprefix("viewbench.")
+
     def backend_sources(self, wildcards: Any) -> list[str]:
         """Files behind a training run."""
-        family = self.study.backend(wildcards.backend).backend.split(":")[0]
-        return sources("workflow.commands.train", plugins.module_name("backends", family).removeprefix("viewbench."))
+        return sources("workflow.commands.train", self._backend_module(wildcards))
+
+    def warm_sources(self, wildcards: Any) -> list[str]:
+        """Files behind a backend's compiled kernels."""
+        return sources("workflow.commands.warm", self._backend_module(wildcards))
 
     def backend_options(self, wildcards: Any) -> str:
         """Options of `viewbench train` for the cell's backend."""
@@ -132,7 +144,7 @@ class Wiring:
     @property
     def templates(self) -> list[str]:
         """Files of the page's template."""
-        return sorted(str(path) for path in (PACKAGE / "reports" / "templates").iterdir() if path.is_file())
+        return sorted(from_here(path) for path in (PACKAGE / "reports" / "templates").iterdir() if path.is_file())
 
     @property
     def tracks_as_it_goes(self) -> bool:

@@ -65,9 +65,9 @@ def _write_truth(test, width: int, folder: Path) -> None:
     """The test images as they are compared with, for the pictures in the reports."""
     import numpy as np
 
-    from viewbench.backends._evaluate import file_stem, save_png, to_uint8
     from viewbench.scenes.images import load_images
+    from viewbench.scenes.pictures import picture_name, save_png, to_uint8
 
     images, _ = load_images(test, np.arange(len(test)), width)
     for number, (name, image) in enumerate(zip(test.names, images, strict=True)):
-        save_png(to_uint8(image, image.shape, name), folder / f"{number:04d}_{file_stem(name)}.png")
+        save_png(to_uint8(image, image.shape, name), folder / picture_name(number, name))

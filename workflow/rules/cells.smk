@@ -15,6 +15,8 @@ rule select:
     params:
         selector=lambda wildcards: STUDY.selector(wildcards.selector).selector,
         options=WIRING.selector_options,
+    message:
+        "select {wildcards.scene}: {wildcards.selector}, ratio {wildcards.ratio}, seed {wildcards.seed}"
     shell:
         "viewbench select {wildcards.scene:q} --selector {params.selector:q} --ratio {wildcards.ratio}"
         " --seed {wildcards.seed} {params.options} --selection {output:q} > /dev/null 2> {log:q}"
@@ -39,6 +41,8 @@ rule train:
         folder=subpath(output[0], parent=True),
         backend=lambda wildcards: STUDY.backend(wildcards.backend).backend,
         options=WIRING.backend_options,
+    message:
+        "train {wildcards.scene}: {wildcards.selector}, ratio {wildcards.ratio}, seed {wildcards.seed}, {wildcards.backend}"
     shell:
         "viewbench train {wildcards.scene:q} --selection {input.selection:q} --backend {params.backend:q}"
         " --seed {wildcards.seed} {params.options} --out {params.folder:q} > /dev/null 2> {log:q}"
@@ -62,5 +66,7 @@ rule evaluate:
         gpu=WIRING.gpu,
     params:
         folder=subpath(output[0], parent=True),
+    message:
+        "evaluate {wildcards.scene}: {wildcards.selector}, ratio {wildcards.ratio}, seed {wildcards.seed}, {wildcards.backend}"
     shell:
         "viewbench evaluate {params.folder:q} {wildcards.scene:q} --out {params.folder:q} > /dev/null 2> {log:q}"

@@ -1,5 +1,6 @@
 # What is done with the finished cells.
 
+STAGES = ("selection", "train", "metrics")
 METRICS = expand(f"{RESULTS}/cells/{{cell}}/metrics.json", cell=CELLS.instance_patterns)
 
 
@@ -11,12 +12,16 @@ rule collect:
         sources=WIRING.sources("workflow.commands.collect"),
     output:
         f"{RESULTS}/results.csv",
+    log:
+        f"{RESULTS}/logs/collect.log",
     localrule: True
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,
+    message:
+        "gather the cells into results.csv"
     shell:
-        "viewbench collect {params.study:q} --results {params.results:q} > /dev/null"
+        "viewbench collect {params.study:q} --results {params.results:q} > /dev/null 2> {log:q}"
 
 
 rule track_cell:
@@ -31,6 +36,8 @@ rule track_cell:
         study=GIVEN,
         results=Path(RESULTS).parent,
         cell=CELLS.wildcard_pattern,
+    message:
+        "log {wildcards.scene}/{wildcards.selector}/{wildcards.ratio}/{wildcards.seed} to MLflow"
     shell:
         "viewbench track {params.study:q} --results {params.results:q} --cell {params.cell:q}"
         " --stamp {output:q} 2> {log:q}"
@@ -54,6 +61,8 @@ rule track:
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,
+    message:
+        "log the cells to MLflow"
     shell:
         "viewbench track {params.study:q} --results {params.results:q} --stamp {output:q} 2> {log:q}"
 
@@ -68,7 +77,9 @@ rule report:
     log:
         f"{RESULTS}/logs/report/{{report}}.log",
     params:
-        folder=RESULTS,
+        folder=subpath(output[0], ancestor=2),
+    message:
+        "draw {wildcards.report}"
     shell:
         "viewbench report {params.folder:q} --only {wildcards.report:q} > /dev/null 2> {log:q}"
 
@@ -83,7 +94,9 @@ rule page:
     log:
         f"{RESULTS}/logs/report/page.log",
     params:
-        folder=RESULTS,
+        folder=subpath(output[0], ancestor=2),
+    message:
+        "put the page together"
     shell:
         "viewbench report {params.folder:q} --page > /dev/null 2> {log:q}"
 
@@ -93,3 +106,9 @@ rule reports:
     input:
         f"{RESULTS}/reports/index.html",
         f"{RESULTS}/tracked.json",
+        # Named here too, since Snakemake looks for a missing file only where a target asks for it.
+        expand(
+            f"{RESULTS}/cells/{{cell}}/{{file}}.json",
+            cell=CELLS.instance_patterns,
+            file=STAGES,
+        ),

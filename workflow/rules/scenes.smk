@@ -3,15 +3,19 @@
 
 rule study:
     input:
-        STUDY.source,
+        WIRING.study_file,
         WIRING.sources("workflow.commands.study"),
     output:
         f"{RESULTS}/study.json",
+    log:
+        f"{RESULTS}/logs/study.log",
     localrule: True
     params:
         study=GIVEN,
+    message:
+        "check the study file"
     shell:
-        "viewbench study {params.study:q} --out {output:q}"
+        "viewbench study {params.study:q} --out {output:q} 2> {log:q}"
 
 
 rule describe:
@@ -24,6 +28,8 @@ rule describe:
         f"{RESULTS}/logs/describe/{{scene}}.log",
     params:
         width=WIRING.truth_width,
+    message:
+        "describe {wildcards.scene}"
     shell:
         "viewbench describe {wildcards.scene:q} --width {params.width} --out {output:q} 2> {log:q}"
 
@@ -41,18 +47,22 @@ rule features:
     threads: SETTINGS.compute.threads
     params:
         encoder=STUDY.encoder,
+    message:
+        "features of {wildcards.scene}"
     shell:
         "viewbench features {wildcards.scene:q} --encoder {params.encoder:q} --out {output:q} 2> {log:q}"
 
 
 rule warm:
     input:
-        WIRING.backend_sources,
+        WIRING.warm_sources,
     output:
         touch(f"{RESULTS}/warm/{{backend}}"),
     log:
         f"{RESULTS}/logs/warm/{{backend}}.log",
     params:
         backend=lambda wildcards: STUDY.backend(wildcards.backend).backend,
+    message:
+        "prepare backend {wildcards.backend}"
     shell:
         "viewbench warm --backend {params.backend:q} 2> {log:q}"

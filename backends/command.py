@@ -1,0 +1,214 @@
+"""Any trainer that runs as a command, described in environment.toml as [command.NAME]."""
+
+import hashlib
+import shutil
+import string
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewbench.backends import _process, _subset
+from viewbench.backends._seeding import SOURCES, seed_points
+from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
+from viewbench.common.errors import UserError, nearest
+from viewbench.common.settings import Command, Settings
+from viewbench.scenes.types import Cameras
+
+LOG = "command.log"
+SCENE = "scene"  # the subset, inside the model folder while the program trains
+TRAIN_PLACES = ("scene", "out", "seed", "iterations", "seconds", "width", "height", "views")
+RENDER_PLACES = ("cameras", "renders", "out", "width", "height")
+OUTPUT_PLACES = ("name", "index")
+VERSION_SECONDS = 60.0
+POINTS_OFF = "none"
+RANDOM_POINTS = 100_000  # as the 3DGS authors draw where a scene has none
+
+CAPABILITIES = Capabilities()  # of the family; an entry's own depend on its command line
+
+
+def available() -> str | None:
+    """The family by itself trains nothing."""
+    return "it runs programs as command:NAME; add a section [command.NAME] to environment.toml"
+
+
+def version() -> str:
+    """The family has none."""
+    return ""
+
+
+def configured(argument: str, settings: Settings) -> Any:
+    """The backend `command:NAME`. Raises UserError for a section that is missing or cannot work."""
+    if not argument:
+        return sys.modules[__name__]
+    if argument not in settings.command:
+        known = list(settings.command)
+        there = f" (there are: {', '.join(known)})" if known else "; none is configured"
+        raise UserError(f"{settings.source} has no [command.{argument}]{nearest(argument, known)}{there}")
+    entry = settings.command[argument]
+    where = f"{settings.source} [command.{argument}]"
+    _check(entry, where)
+    return External(argument, entry)
+
+
+@dataclass(frozen=True)
+class External:
+    """One configured program as a backend."""
+
+    name: str
+    entry: Command
+
+    @property
+    def CAPABILITIES(self) -> Capabilities:  # noqa: N802 - the name that the protocol gives it
+        """A limit is obeyed where the command line passes it on."""
+        places = _places(self.entry.train)
+        return Capabilities(
+            device=self.entry.device,
+            iterations="iterations" in places,
+            seconds="seconds" in places,
+            options={"points": "scene"},
+        )
+
+    def available(self) -> str | None:
+        for part, command in (("train", self.entry.train), ("render", self.entry.render)):
+            if shutil.which(command[0]) is None:
+                return f"'{command[0]}', which its `{part}` command starts, is not installed or not on PATH"
+        return None
+
+    def version(self) -> str:
+        """What its `version` command prints last, or a hash of the files that its command lines name."""
+        if not self.entry.version:
+            return f"sha256:{_hash_of_files([*self.entry.train, *self.entry.render])}"
+        with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
+            log = Path(folder) / LOG
+            _process.run(self.entry.version, Path(folder), log, f"{self._what} --version", VERSION_SECONDS)
+            return _process.last_line(log)
+
+    def train(
+        self, data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict[str, Any], report: Report
+    ) -> Trained:
+        """Writes the chosen views as a scene, runs the `train` command in `out`, and keeps what it leaves there.
+
+        The seconds are those of the whole program, its set-up included: nobody sees inside. Raises UserError for a
+        budget that the command line needs and does not have, and whatever ends the program before its time.
+        """
+        values = {
+            "out": out.resolve(),
+            "scene": out.resolve() / SCENE,
+            "seed": seed,
+            "width": int(data.cameras.width[0]),
+            "height": int(data.cameras.height[0]),
+            "views": len(data.names),
+        }
+        for limit in ("iterations", "seconds"):
+            value = getattr(budget, limit)
+            if value is not None:
+                values[limit] = value
+            elif limit in _places(self.entry.train):
+                raise UserError(f"{self._what} takes {limit}; add them to the budget")
+        points, seeding = self._points(data, str(options["points"]), seed)
+        _subset.write(out / SCENE, self.entry.format, data.cameras, data.images, points)
+        began = time.perf_counter()
+        report.progress(0, None, f"running {self.entry.train[0]}, which writes {LOG}")
+        _process.run(_filled(self.entry.train, values), out, out / LOG, self._what, self.entry.timeout or None)
+        seconds = time.perf_counter() - began
+        shutil.rmtree(out / SCENE)
+        if not any(path.name != LOG for path in out.iterdir()):
+            raise UserError(f"{self._what} ended well but left nothing in its folder; does its command use {{out}}?")
+        return Trained(
+            iterations=budget.iterations or 0,
+            seconds=seconds,
+            seeding=seeding,
+            device=self.entry.device,
+            notes={"command": [str(part) for part in self.entry.train]},
+        )
+
+    def render(self, model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
+        """Writes the cameras as a scene with black images, runs the `render` command and reads its pictures."""
+        with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
+            place = Path(folder).resolve()
+            _subset.write(place / "cameras", self.entry.format, cameras, None)
+            (place / "renders").mkdir()
+            values = {
+                "out": model.resolve(),
+                "cameras": place / "cameras",
+                "renders": place / "renders",
+                "width": int(cameras.width[0]),
+                "height": int(cameras.height[0]),
+            }
+            command = _filled(self.entry.render, values)
+            _process.run(command, model, place / LOG, f"{self._what} (render)", self.entry.timeout or None)
+            files = [place / "renders" / self._output(index) for index in range(len(cameras))]
+            yield from _subset.read_images(files, cameras, self._what)
+
+    @property
+    def _what(self) -> str:
+        return f"command:{self.name}"
+
+    def _points(self, data: TrainingSet, source: str, seed: int) -> tuple[Any, dict[str, Any]]:
+        """Points for the scene that the program gets; a scene without any is none of its business."""
+        if source == POINTS_OFF or (source == "scene" and data.points is None):
+            return None, {"points": POINTS_OFF, "count": 0}
+        if source not in SOURCES:
+            known = (*SOURCES, POINTS_OFF)
+            raise UserError(f"{self._what}: option 'points' is '{source}'{nearest(source, known)} ({', '.join(known)})")
+        xyz, rgb, record = seed_points(data, source, np.random.default_rng(seed), RANDOM_POINTS)
+        return (xyz, rgb), record
+
+    def _output(self, index: int) -> str:
+        image = Path(_subset.image_name(index))
+        return self.entry.output.format(name=image.stem, index=index)
+
+
+def _check(entry: Command, where: str) -> None:
+    """Raises UserError for a section that cannot work, before anything is run with it."""
+    if entry.format not in _subset.LAYOUTS:
+        known = _subset.LAYOUTS
+        raise UserError(f"{where}: format '{entry.format}'{nearest(entry.format, known)} is none of {', '.join(known)}")
+    if entry.device not in ("cpu", "cuda"):
+        raise UserError(f"{where}: device is '{entry.device}', expected 'cpu' or 'cuda'")
+    templates = (("train", entry.train, TRAIN_PLACES), ("render", entry.render, RENDER_PLACES))
+    for key, command, known in templates:
+        if not command:
+            raise UserError(f"{where}: '{key}' is an empty list; it starts with the program to run")
+        _check_places(command, known, f"{where} '{key}'")
+    _check_places([entry.output], OUTPUT_PLACES, f"{where} 'output'")
+    if not _places([entry.output]):
+        raise UserError(f"{where}: 'output' names one file for all renders; put {{name}} or {{index}} into it")
+
+
+def _check_places(command: list[str], known: tuple[str, ...], where: str) -> None:
+    for part in command:
+        try:
+            parsed = list(string.Formatter().parse(part))
+        except ValueError as error:
+            raise UserError(f"{where}: '{part}': {error}; write a brace that is meant as {{{{ or }}}}") from None
+        for _, place, _, conversion in parsed:
+            if place is not None and (place not in known or conversion):
+                raise UserError(
+                    f"{where}: unknown placeholder {{{place}}}{nearest(place, known)} (known: {', '.join(known)})"
+                )
+
+
+def _places(command: list[str]) -> set[str]:
+    """Names between braces in a command line."""
+    return {place for part in command for _, place, _, _ in string.Formatter().parse(part) if place}
+
+
+def _filled(command: list[str], values: dict[str, Any]) -> list[str]:
+    return [part.format(**values) for part in command]
+
+
+def _hash_of_files(command: list[str]) -> str:
+    """First 12 hex digits of the SHA-256 over the programs and scripts that a command line names."""
+    digest = hashlib.sha256()
+    for part in dict.fromkeys(command):
+        found = shutil.which(part) or (part if Path(part).is_file() else None)
+        if found:
+            digest.update(Path(found).read_bytes())
+    return digest.hexdigest()[:12]

@@ -1,0 +1,118 @@
+"""What the numbers say, in sentences: is the paper's selector better than plain choice, and by more than chance?"""
+
+from viewbench.reports._statistics import Difference, difference, number, over_ratios, signed, summary
+from viewbench.reports._study import Study, and_list, percent
+
+BASELINES = ("uniform", "random")
+SUBJECT = "maxmin"  # the paper's own selector; a study without it is told about its best one
+HEADLINES = {
+    "better": "is better than {baseline} on {scenes}",
+    "worse": "is worse than {baseline} on {scenes}",
+    "not told apart": "cannot be told apart from {baseline} by these seeds on {scenes}",
+    "one sample": "was compared with {baseline} by a single sample on {scenes}",
+}
+WORDS = {
+    "better": "more than the seeds explain",
+    "worse": "more than the seeds explain",
+    "not told apart": "no more than the seeds explain",
+    "one sample": "one sample, so no interval",
+}
+
+
+def headline(study: Study) -> list[str]:
+    """One sentence per baseline over all scenes: where the subject is better, worse, or not told apart."""
+    subject = subject_of(study)
+    if subject is None:
+        return []
+    sentences = []
+    for baseline in BASELINES:
+        scenes: dict[str, list[str]] = {}
+        for backend, scene in study.panels():
+            found = against(study, backend, scene, subject, baseline)
+            if found is not None:
+                scenes.setdefault(found.verdict, []).append(f"{study.label(backend, scene)} ({signed(found.mean)} dB)")
+        parts = [
+            words.format(baseline=baseline, scenes=and_list(scenes[verdict]))
+            for verdict, words in HEADLINES.items()
+            if verdict in scenes
+        ]
+        if parts:
+            sentences.append(f"{subject} {'; it '.join(parts)}.")
+    return sentences
+
+
+def details(study: Study) -> list[str]:
+    """A few sentences per scene: the subject's score, the differences with intervals, the best, the full data."""
+    subject = subject_of(study)
+    return [] if subject is None else [_scene(study, backend, scene, subject) for backend, scene in study.panels()]
+
+
+def subject_of(study: Study) -> str | None:
+    """The selector that the findings are about; None where no selector has a score."""
+    present = [name for name in study.selectors if study.find(selector=name)]
+    if SUBJECT in present:
+        return SUBJECT
+    candidates = [name for name in present if name not in BASELINES] or present
+    return max(candidates, key=lambda name: _mean(study, name), default=None)
+
+
+def against(
+    study: Study,
+    backend: str,
+    scene: str,
+    selector: str,
+    baseline: str,
+    ratios: tuple[float, ...] | None = None,
+) -> Difference | None:
+    """Difference of PSNR in dB, averaged over `ratios` (all of the study's when left out).
+
+    None where the two are the same or a side has no seed with a score at every ratio.
+    """
+    ratios = ratios or study.ratios
+    ours = over_ratios(study.find(backend, scene, selector), ratios)
+    theirs = over_ratios(study.find(backend, scene, baseline), ratios)
+    return difference(ours, theirs) if ours and theirs and selector != baseline else None
+
+
+def _scene(study: Study, backend: str, scene: str, subject: str) -> str:
+    label = study.label(backend, scene)
+    samples = {name: over_ratios(study.find(backend, scene, name), study.ratios) for name in study.selectors}
+    means = {name: summary(values).mean for name, values in samples.items() if values}
+    if subject not in means:
+        return f"{label}: {subject} lacks a score at some ratio, so nothing is concluded."
+    averaged = f"on average over the ratios {and_list(map(percent, study.ratios))}"
+    over = averaged if len(study.ratios) > 1 else f"at a ratio of {percent(study.ratios[0])}"
+    sentences = [f"{label}: {subject} scores {number(means[subject], 2)} dB {over}."]
+    for baseline in BASELINES:
+        found = against(study, backend, scene, subject, baseline)
+        if found is not None:
+            sentences.append(f"Against {baseline}: {_with_interval(found)}, {WORDS[found.verdict]}.")
+    ranked = sorted(means, key=lambda name: -means[name])
+    if ranked[0] != subject:
+        sentences.append(f"The highest mean is that of {ranked[0]}, {number(means[ranked[0]], 2)} dB.")
+    elif len(ranked) > 1:
+        sentences.append(f"Its mean is the highest; {ranked[1]} comes next with {number(means[ranked[1]], 2)} dB.")
+    return " ".join(sentences + _against_full(study, backend, scene, subject))
+
+
+def _with_interval(found: Difference) -> str:
+    if found.low is None or found.high is None:
+        return f"{signed(found.mean)} dB"
+    return f"{signed(found.mean)} dB (95 % interval {signed(found.low)} to {signed(found.high)})"
+
+
+def _against_full(study: Study, backend: str, scene: str, subject: str) -> list[str]:
+    """Zero or one sentence: the subject's largest ratio beside the model trained on all views."""
+    full, ratio = study.full(backend, scene), study.ratios[-1]
+    scores = [cell.psnr_db for cell in study.find(backend, scene, subject, ratio) if cell.psnr_db is not None]
+    if full is None or full.psnr_db is None or not scores:
+        return []
+    gap = summary(scores).mean - full.psnr_db
+    return [
+        f"At {percent(ratio)} it is {number(abs(gap), 2)} dB {'above' if gap >= 0 else 'below'} one model trained on "
+        f"all {full.count} views ({number(full.psnr_db, 2)} dB)."
+    ]
+
+
+def _mean(study: Study, selector: str) -> float:
+    return summary([cell.psnr_db for cell in study.find(selector=selector) if cell.psnr_db is not None]).mean

@@ -1,0 +1,164 @@
+"""Puts everything that was drawn into index.html: one file that needs nothing beside it and no network."""
+
+import base64
+import io
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from viewbench import __version__
+from viewbench.common import plugins
+from viewbench.common.errors import UserError
+from viewbench.common.files import write_text
+from viewbench.common.provenance import machine
+from viewbench.reports import _findings, _items, _study
+from viewbench.reports._items import Item
+from viewbench.reports._study import FULL, Study, and_list, in_order, percent
+
+TEMPLATES = Path(__file__).parent / "templates"
+HEAVY_BYTES = 300_000  # a larger PNG goes into the page as WebP; the PNG itself stays beside the page
+LAST = 100  # place of a report that names none (ORDER)
+
+
+@dataclass(frozen=True)
+class Section:
+    """One item as the template shows it."""
+
+    anchor: str
+    item: Item
+    image: str = ""  # data URI of a figure
+    width: int = 0  # pixels
+    height: int = 0
+
+
+def build(study_dir: Path) -> Path:
+    """Writes results/STUDY/reports/index.html from the items of the study's reports; returns its path.
+
+    Raises UserError when none has been drawn yet.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    study = _study.load(study_dir)
+    out = study.folder / "reports"
+    sections = _sections(study, out)
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    html = environment.get_template("page.html").render(
+        study=study,
+        headline=[_tied(sentence) for sentence in _findings.headline(study)],
+        details=[_tied(sentence) for sentence in _findings.details(study)],
+        grid=_grid_words(study),
+        facts=_facts(study),
+        sections=sections,
+        failed=study.failed,
+        percent=percent,
+        style=(TEMPLATES / "page.css").read_text(encoding="utf-8"),
+        script=(TEMPLATES / "page.js").read_text(encoding="utf-8"),
+    )
+    path = out / "index.html"
+    write_text(path, html)
+    return path
+
+
+def _sections(study: Study, out: Path) -> list[Section]:
+    names = sorted(study.record["reports"], key=lambda name: (plugins.constant("reports", name, "ORDER", LAST), name))
+    drawn = [name for name in names if _items.path(out, name).is_file()]
+    if not drawn:
+        raise UserError(f"no report of '{study.folder}' has been drawn; run `viewbench report {study.folder}`")
+    items = [item for name in drawn for item in _items.read(out, name)]
+    return [_section(f"item-{number}", item, out) for number, item in enumerate(items, start=1)]
+
+
+def _section(anchor: str, item: Item, out: Path) -> Section:
+    if item.kind != "figure":
+        return Section(anchor, item)
+    from PIL import Image
+
+    data, kind = (out / item.files[0]).read_bytes(), "png"
+    with Image.open(io.BytesIO(data)) as image:
+        width, height = image.size
+        if len(data) > HEAVY_BYTES:
+            buffer = io.BytesIO()
+            image.convert("RGB").save(buffer, format="WEBP", quality=90, method=4)
+            data, kind = buffer.getvalue(), "webp"
+    return Section(anchor, item, f"data:image/{kind};base64,{base64.b64encode(data).decode()}", width, height)
+
+
+def _facts(study: Study) -> list[tuple[str, str]]:
+    """What was run, where and when, as (what, value) pairs; what no file says is left out."""
+    trains = [cell.read("train") for cell in study.done]
+    here = machine()
+    devices = in_order(
+        f"{train['device']}, {train['threads']} thread{'s' if train['threads'] != 1 else ''} per job"
+        for train in trains
+    )
+    facts = [
+        ("Scenes", and_list(_scene_words(study, scene) for scene in study.scenes)),
+        ("Selectors", and_list(study.selectors)),
+        ("Ratios", and_list(map(percent, study.ratios))),
+        ("Seeds", and_list(map(str, study.seeds))),
+        ("Backends", "; ".join(_backend_words(study, entry, trains) for entry in study.record["backends"])),
+        ("Reference", "one model on all views per scene" if study.record.get("reference") else "none"),
+        ("Image encoder", study.record.get("encoder", "")),
+        (
+            "Cells",
+            f"{len(study.done)} of {len(study.cells)} scored"
+            + (f", {len(study.failed)} failed" if study.failed else ""),
+        ),
+        ("Trained on", "; ".join(devices)),
+        ("Page made on", f"{here['cpu']}, {here['cpus']} CPUs, {here['system']}, Python {here['python']}"),
+        ("viewbench", and_list(in_order(cell.viewbench for cell in study.done)) or __version__),
+        ("Commit", and_list(in_order(cell.commit for cell in study.done if cell.commit))),
+        ("Results of", _date(study.folder / "results.csv")),
+    ]
+    return [(what, value) for what, value in facts if value]
+
+
+def _grid_words(study: Study) -> str:
+    """ "2 scenes × 5 selectors × 3 ratios × 3 seeds; 80 of 80 cells scored"."""
+    counts = {
+        "scene": len(study.scenes),
+        "selector": len(study.selectors),
+        "ratio": len(study.ratios),
+        "seed": len(study.seeds),
+        "backend": len(study.backends),
+    }
+    grid = " × ".join(f"{count} {what}{'s' if count != 1 else ''}" for what, count in counts.items())
+    return f"{grid}: {len(study.done)} of {len(study.cells)} cells scored"
+
+
+def _scene_words(study: Study, scene: str) -> str:
+    views = next((cell.n_views for cell in study.done if cell.scene == scene and cell.n_views), None)
+    return scene if views is None else f"{scene} ({views} training views)"
+
+
+def _backend_words(study: Study, entry: dict[str, Any], trains: list[dict[str, Any]]) -> str:
+    """ "splat 1.0: 1,500 iterations at width 128"."""
+    name = entry["name"]
+    own = [train for cell, train in zip(study.done, trains, strict=True) if cell.backend == name]
+    version = and_list(in_order(str(train["version"]) for train in own))
+    limits = []
+    if entry.get("iterations"):
+        limits.append(f"{entry['iterations']:,} iterations")
+    if entry.get("seconds"):
+        limits.append(f"{entry['seconds']:g} s")
+    if FULL in {cell.selector for cell in study.find(name)}:
+        limits.append("the reference too")
+    width = f" at width {entry['width']}" if entry.get("width") else " at full width"
+    called = name if entry["backend"] == name else f"{name} ({entry['backend']})"
+    return f"{called} {version}".strip() + f": {', '.join(limits)}{width}"
+
+
+def _tied(text: str) -> str:
+    """The text with units kept on the line of their numbers."""
+    return text.replace(" dB", "\u00a0dB").replace(" %", "\u00a0%")
+
+
+def _date(path: Path) -> str:
+    return time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime(path.stat().st_mtime))

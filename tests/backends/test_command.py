@@ -1,0 +1,145 @@
+"""The `command` backend with a real program of its own, and with everything that can be wrong about one."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.backends.conftest import nearest_command, settings_with
+from viewbench.backends import _registry
+from viewbench.backends._types import Budget, Report
+from viewbench.common import settings as settings_file
+from viewbench.common.errors import UserError
+
+OPTIONS = {"points": "scene"}
+
+
+def load(**changes: object):
+    return _registry.load("command:tool", settings_with(tool=nearest_command(**changes)))
+
+
+def train(backend, views, out: Path, budget: Budget = Budget(iterations=10), options: dict = OPTIONS):
+    out.mkdir()
+    return backend.train(views, out, 5, budget, options, Report())
+
+
+def python(code: str) -> list[str]:
+    """A program that does `code`; braces in it are doubled, as in any template."""
+    return [sys.executable, "-c", code]
+
+
+def test_the_nearest_view_is_rendered_at_the_camera_s_size(take_views, tmp_path):
+    views, backend = take_views(), load()
+    trained = train(backend, views, tmp_path / "model")
+    assert trained.iterations == 10
+    assert not (tmp_path / "model" / "scene").exists(), "the subset is not kept beside the model"
+    assert "kept 3 views" in (tmp_path / "model" / "command.log").read_text()
+    for image, view in zip(backend.render(tmp_path / "model", views.cameras), views.images, strict=True):
+        assert np.abs(image - view).max() <= 0.5 / 255 + 1e-6
+    (small,) = backend.render(tmp_path / "model", views.cameras[:1].scaled(20))
+    assert (small.shape, small.dtype) == ((20, 20, 3), np.float32)
+
+
+def test_the_program_sees_the_chosen_views_and_no_name_of_theirs(take_views, tmp_path):
+    views = take_views()
+    nasty = type(views)(**{**vars(views), "scene": "$(reboot)", "names": ("; rm -rf ~", "`x`", "-flag")})
+    code = "import sys, pathlib; print(*sys.argv[1:]); print(*sorted(str(p.name) for p in pathlib.Path(sys.argv[1]).rglob('*')))"
+    trained = train(load(train=[*python(code), "{scene}", "{seed}", "--w={width}", "{views}"]), nasty, tmp_path / "m")
+    printed = (tmp_path / "m" / "command.log").read_text()
+    assert printed.splitlines()[0].endswith("scene 5 --w=48 3")
+    assert printed.splitlines()[1] == "00000.png 00001.png 00002.png images points3d.ply transforms.json"
+    assert trained.seeding == {"points": "scene", "count": 200, "of": 200}
+
+
+@pytest.mark.parametrize(("source", "count"), [("none", 0), ("random", 100_000)])
+def test_the_points_of_all_views_can_be_kept_from_the_program(take_views, tmp_path, source, count):
+    code = "import pathlib, sys; print(pathlib.Path(sys.argv[1], 'points3d.ply').exists()); open('model', 'w')"
+    trained = train(load(train=[*python(code), "{scene}"]), take_views(), tmp_path / "m", options={"points": source})
+    assert trained.seeding["count"] == count
+    assert (tmp_path / "m" / "command.log").read_text().strip() == str(count > 0)
+
+
+def test_limits_are_obeyed_where_the_command_line_names_them():
+    assert (load().CAPABILITIES.iterations, load().CAPABILITIES.seconds) == (True, False)
+    timed = load(train=["true", "{seconds}"], device="cuda").CAPABILITIES
+    assert (timed.iterations, timed.seconds, timed.device) == (False, True, "cuda")
+
+
+def test_a_budget_that_the_command_line_needs_is_asked_for(take_views, tmp_path):
+    with pytest.raises(UserError, match="command:tool takes iterations"):
+        train(load(), take_views(), tmp_path / "m", Budget(seconds=5))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"train": ["x", "{sead}"]}, r"'train': unknown placeholder \{sead\}; did you mean 'seed'\?"),
+        ({"train": ["x", "{scene!r}"]}, "unknown placeholder"),
+        ({"train": ["x", "{scene.name}"]}, "unknown placeholder"),
+        ({"train": ["x", '{"a": 1}']}, "unknown placeholder"),
+        ({"train": ["x", "{"]}, "write a brace that is meant"),
+        ({"train": []}, "'train' is an empty list"),
+        ({"render": []}, "'render' is an empty list"),
+        ({"render": ["x", "{scene}"]}, r"'render': unknown placeholder \{scene\}"),
+        ({"output": "render.png"}, "'output' names one file for all renders"),
+        ({"format": "colmop"}, "did you mean 'colmap'"),
+        ({"device": "gpu"}, "expected 'cpu' or 'cuda'"),
+    ],
+)
+def test_a_section_that_cannot_work_is_refused_before_anything_runs(changes, message):
+    with pytest.raises(UserError, match=message):
+        load(**changes)
+
+
+def test_a_name_that_is_not_configured_is_answered_with_the_nearest():
+    with pytest.raises(UserError, match=r"no \[command\.nearset\]; did you mean 'nearest'"):
+        _registry.load("command:nearset", settings_with(nearest=nearest_command()))
+    assert "add a section [command.NAME]" in _registry.load("command", settings_with()).available()
+
+
+def test_an_absent_program_is_unavailable_and_says_which():
+    reason = load(render=["no-such-renderer"]).available()
+    assert reason == "'no-such-renderer', which its `render` command starts, is not installed or not on PATH"
+    assert load().available() is None
+
+
+def test_version_is_what_the_program_says_or_a_hash_of_its_files(tmp_path):
+    assert load(version=python("print('tool 1.2')")).version() == "tool 1.2"
+    script = tmp_path / "tool.py"
+    versions = set()
+    for text in ("pass", "pass # edited", "pass"):
+        script.write_text(text)
+        versions.add(load(train=[sys.executable, str(script)]).version())
+    assert len(versions) == 2
+
+
+def test_failures_of_the_program_are_one_sentence(take_views, tmp_path):
+    views = take_views()
+    with pytest.raises(UserError, match="command:tool failed with exit status 1: ValueError: out of memory"):
+        train(load(train=python("raise ValueError('out of memory')")), views, tmp_path / "a")
+    with pytest.raises(UserError, match="left nothing in its folder"):
+        train(load(train=python("pass")), views, tmp_path / "b")
+    with pytest.raises(UserError, match="stopped after 1 s"):
+        train(load(train=python("import time; time.sleep(60)"), timeout=1), views, tmp_path / "c")
+    with pytest.raises(UserError, match="option 'points' is 'scenes'; did you mean 'scene'"):
+        train(load(), views, tmp_path / "d", options={"points": "scenes"})
+
+
+def test_renders_are_looked_for_where_output_says(take_views, tmp_path):
+    views = take_views()
+    train(load(), views, tmp_path / "m")
+    with pytest.raises(UserError, match=r"wrote 0 of 3 renders, '00000_rgb\.png' is not there"):
+        list(load(output="sub/{name}_rgb.png").render(tmp_path / "m", views.cameras))
+    assert len(list(load(output="{index:05d}.png").render(tmp_path / "m", views.cameras))) == 3
+
+
+def test_the_section_is_read_from_environment_toml(tmp_path):
+    file = tmp_path / "environment.toml"
+    file.write_text(
+        '[command.mine]\ntrain = ["a", "{scene}"]\nrender = ["b", "{cameras}"]\nformat = "colmap"\n'
+        'version = ["a", "--version"]\ndevice = "cuda"\ntimeout = 60\n'
+    )
+    settings = settings_file.load(file)
+    assert "command:mine" in _registry.names(settings)
+    assert _registry.load("command:mine", settings).CAPABILITIES.device == "cuda"
