@@ -14,7 +14,7 @@ from viewbench.common.files import write_text
 from viewbench.common.provenance import machine
 from viewbench.reports import _findings, _items, _study
 from viewbench.reports._items import Item
-from viewbench.reports._study import FULL, Study, and_list, in_order, percent
+from viewbench.reports._study import OK, Study, and_list, in_order, percent
 
 TEMPLATES = Path(__file__).parent / "templates"
 HEAVY_BYTES = 300_000  # a larger PNG goes into the page as WebP; the PNG itself stays beside the page
@@ -56,8 +56,7 @@ def build(study_dir: Path) -> Path:
         grid=_grid_words(study),
         facts=_facts(study),
         sections=sections,
-        failed=study.failed,
-        percent=percent,
+        failures=_failures(study),
         style=(TEMPLATES / "page.css").read_text(encoding="utf-8"),
         script=(TEMPLATES / "page.js").read_text(encoding="utf-8"),
     )
@@ -90,6 +89,16 @@ def _section(anchor: str, item: Item, out: Path) -> Section:
     return Section(anchor, item, f"data:image/{kind};base64,{base64.b64encode(data).decode()}", width, height)
 
 
+def _failures(study: Study) -> list[tuple[str, list[str]]]:
+    """What went wrong, and the cells that it happened to."""
+    groups: dict[str, list[str]] = {}
+    for cell in study.failed:
+        reason = cell.status if cell.status != OK else "the cell has no PSNR"
+        words = f"{cell.scene}, {cell.backend}, {cell.selector}, {percent(cell.ratio)}, seed {cell.seed}"
+        groups.setdefault(reason, []).append(words)
+    return list(groups.items())
+
+
 def _facts(study: Study) -> list[tuple[str, str]]:
     """What was run, where and when, as (what, value) pairs; what no file says is left out."""
     trains = [cell.read("train") for cell in study.done]
@@ -104,7 +113,7 @@ def _facts(study: Study) -> list[tuple[str, str]]:
         ("Ratios", and_list(map(percent, study.ratios))),
         ("Seeds", and_list(map(str, study.seeds))),
         ("Backends", "; ".join(_backend_words(study, entry, trains) for entry in study.record["backends"])),
-        ("Reference", "one model on all views per scene" if study.record.get("reference") else "none"),
+        ("Reference", "one model on all views of each scene, same budget" if study.record.get("reference") else "none"),
         ("Image encoder", study.record.get("encoder", "")),
         (
             "Cells",
@@ -148,8 +157,6 @@ def _backend_words(study: Study, entry: dict[str, Any], trains: list[dict[str, A
         limits.append(f"{entry['iterations']:,} iterations")
     if entry.get("seconds"):
         limits.append(f"{entry['seconds']:g} s")
-    if FULL in {cell.selector for cell in study.find(name)}:
-        limits.append("the reference too")
     width = f" at width {entry['width']}" if entry.get("width") else " at full width"
     called = name if entry["backend"] == name else f"{name} ({entry['backend']})"
     return f"{called} {version}".strip() + f": {', '.join(limits)}{width}"

@@ -35,7 +35,7 @@ def save(table: Table, out: Path, name: str, records: Sequence[Mapping[str, obje
 
 
 def write_csv(path: Path, records: Sequence[Mapping[str, object]]) -> None:
-    """Writes records that share their keys, floats to 6 significant digits beyond the unit; None is empty."""
+    """Writes records that share their keys, floats to 6 significant digits; None is empty."""
     columns = list(records[0]) if records else []
     with whole(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, columns, lineterminator="\n")

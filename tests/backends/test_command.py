@@ -13,13 +13,14 @@ from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 
 OPTIONS = {"points": "scene"}
+TEN = Budget(iterations=10)
 
 
 def load(**changes: object):
     return _registry.load("command:tool", settings_with(tool=nearest_command(**changes)))
 
 
-def train(backend, views, out: Path, budget: Budget = Budget(iterations=10), options: dict = OPTIONS):
+def train(backend, views, out: Path, budget: Budget = TEN, options: dict = OPTIONS):
     out.mkdir()
     return backend.train(views, out, 5, budget, options, Report())
 
@@ -44,7 +45,10 @@ def test_the_nearest_view_is_rendered_at_the_camera_s_size(take_views, tmp_path)
 def test_the_program_sees_the_chosen_views_and_no_name_of_theirs(take_views, tmp_path):
     views = take_views()
     nasty = type(views)(**{**vars(views), "scene": "$(reboot)", "names": ("; rm -rf ~", "`x`", "-flag")})
-    code = "import sys, pathlib; print(*sys.argv[1:]); print(*sorted(str(p.name) for p in pathlib.Path(sys.argv[1]).rglob('*')))"
+    code = (
+        "import sys, pathlib; print(*sys.argv[1:]); open('model', 'w')\n"
+        "print(*sorted(path.name for path in pathlib.Path(sys.argv[1]).rglob('*')))"
+    )
     trained = train(load(train=[*python(code), "{scene}", "{seed}", "--w={width}", "{views}"]), nasty, tmp_path / "m")
     printed = (tmp_path / "m" / "command.log").read_text()
     assert printed.splitlines()[0].endswith("scene 5 --w=48 3")

@@ -24,12 +24,15 @@ from viewbench.workflow.commands import _options
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
 @click.option("--dry-run", is_flag=True, help="Choose and print, write nothing.")
 @click.option("--selection", type=click.Path(path_type=Path), help="Write only selection.json, to this file.")
+@click.option("--plot", type=click.Path(path_type=Path), help="Picture of the choice: .png, .pdf, .svg or .html (3D).")
 @click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
 @_options.format_option
 @_options.holdout_option
 def command(**given: Any) -> None:
     """Choose views of SCENE and write them to --out, in the format that was read, with selection.json."""
+    import numpy as np
+
     from viewbench.common import settings as settings_file
     from viewbench.common.errors import UserError
     from viewbench.common.files import write_json
@@ -58,6 +61,12 @@ def command(**given: Any) -> None:
         from viewbench.scenes.subset import write_subset
 
         write_subset(scene, record, given["out"], copy=given["copy"], force=given["force"])
+    if given["plot"]:
+        from viewbench.reports._selection_plot import plot
+
+        title = f"{scene.name}: {count} of {n} views by {given['selector']}"
+        cameras = scene.train.cameras
+        plot(given["plot"], title, cameras.positions, cameras.forward, np.asarray(record["indices"]))
     if given["dry_run"] or not given["selection"]:
         for name in record["names"]:
             click.echo(name)

@@ -1,0 +1,84 @@
+"""A picture of one choice: the path from above (.png, .pdf, .svg), or in three dimensions to turn around (.html)."""
+
+from pathlib import Path
+
+import numpy as np
+
+from viewbench.common.errors import UserError, nearest
+from viewbench.common.files import whole
+
+KINDS = (".png", ".pdf", ".svg", ".html")
+GREY, CHOSEN = "#9a9a9a", "#D55E00"
+
+
+def plot(path: Path, title: str, positions: np.ndarray, forward: np.ndarray, chosen: np.ndarray) -> None:
+    """Draws all frames grey and the chosen ones with their viewing direction.
+
+    `positions` (N, 3) in scene units, `forward` (N, 3) unit viewing directions, `chosen` (K,) indices in the order
+    chosen. Raises UserError for a kind of file that is not drawn, or without plotly where `.html` is asked for.
+    """
+    kind = path.suffix.lower()
+    if kind not in KINDS:
+        raise UserError(f"--plot '{path}': expected a file ending in one of {', '.join(KINDS)}{nearest(kind, KINDS)}")
+    draw = _interactive if kind == ".html" else _from_above
+    with whole(path) as temporary:
+        draw(temporary, title, positions, forward, chosen)
+
+
+def _arrow(positions: np.ndarray) -> float:
+    """Length of a viewing direction: a share of the extent that stays readable from 10 to 1,000 chosen views."""
+    return 0.04 * float(np.ptp(positions, axis=0).max() or 1.0)
+
+
+def _from_above(path: Path, title: str, positions: np.ndarray, forward: np.ndarray, chosen: np.ndarray) -> None:
+    from viewbench.reports._figures import grid, look
+    from viewbench.reports._topview import pieces, plane
+
+    axes_2d = plane(positions, forward)
+    flat, looks = positions @ axes_2d.T, forward @ axes_2d.T
+    with look():
+        figure, (axes,) = grid(1, 6.5, 6.5)
+        for piece in pieces(flat):
+            axes.plot(*piece.T, color=GREY, linewidth=0.8, zorder=1)
+        axes.scatter(*flat.T, s=4, color=GREY, zorder=1, label=f"all {len(positions)} frames")
+        axes.quiver(
+            *flat[chosen].T,
+            *looks[chosen].T,
+            color=CHOSEN,
+            angles="xy",
+            scale_units="xy",
+            scale=1 / _arrow(positions),
+            width=0.003,
+            zorder=3,
+        )
+        axes.scatter(*flat[chosen].T, s=12, color=CHOSEN, zorder=3, label=f"{len(chosen)} chosen, with their direction")
+        axes.set_aspect("equal")
+        axes.set_title(title)
+        axes.set_xlabel("scene units, seen from above")
+        figure.legend(loc="outside lower center", ncols=2)
+        figure.savefig(path)
+
+
+def _interactive(path: Path, title: str, positions: np.ndarray, forward: np.ndarray, chosen: np.ndarray) -> None:
+    try:
+        import plotly.graph_objects as go
+    except ImportError:
+        raise UserError("an interactive picture needs plotly: pip install 'viewbench[plot]'") from None
+    tips = positions[chosen] + _arrow(positions) * forward[chosen]
+    rays = np.stack([positions[chosen], tips, np.full_like(tips, np.nan)], axis=1).reshape(-1, 3)
+    order = [f"chosen as number {rank + 1}, frame {index}" for rank, index in enumerate(chosen)]
+    grey, orange = {"color": GREY, "size": 2}, {"color": CHOSEN, "size": 4}
+    figure = go.Figure(
+        [
+            go.Scatter3d(**_xyz(positions), mode="lines+markers", marker=grey, line={"color": GREY}, name="all frames"),
+            go.Scatter3d(**_xyz(rays), mode="lines", line={"color": CHOSEN, "width": 4}, name="viewing direction"),
+            go.Scatter3d(**_xyz(positions[chosen]), mode="markers", marker=orange, name="chosen", hovertext=order),
+        ]
+    )
+    figure.update_layout(title=title, scene={"aspectmode": "data"}, margin={"l": 0, "r": 0, "b": 0, "t": 40})
+    figure.write_html(path, include_plotlyjs=True)
+
+
+def _xyz(points: np.ndarray) -> dict[str, list[float | None]]:
+    values = [[None if np.isnan(v) else float(v) for v in axis] for axis in points.T]
+    return dict(zip("xyz", values, strict=True))

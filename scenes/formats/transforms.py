@@ -1,0 +1,152 @@
+"""transforms.json of Blender and nerfstudio: one file, or transforms_train/test/val.json (IndoorTraj, Replica)."""
+
+import json
+import math
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from viewbench.common.errors import UserError
+from viewbench.common.files import read_json
+from viewbench.scenes.types import Cameras, Points, Scene, Split
+
+WRITABLE = True
+SUFFIXES = (".png", ".jpg", ".jpeg", ".JPG", ".PNG")  # tried in turn where file_path has none, as Blender's has not
+
+
+def detect(root: Path) -> str | None:
+    """Why the folder is in this format, or None."""
+    for name in ("transforms.json", "transforms_train.json"):
+        if (root / name).is_file():
+            return f"it has {name}"
+    return None
+
+
+def read(root: Path) -> Scene:
+    """Reads both splits, poses as they stand (they are camera-to-world with OpenGL axes already) and points.
+
+    Raises UserError for files that are missing or not as documented.
+    """
+    names = {"train": "transforms_train.json", "test": "transforms_test.json"}
+    if (root / "transforms.json").is_file():
+        names = {"train": "transforms.json"}
+    files = [root / name for name in names.values() if (root / name).is_file()]
+    tables = {split: read_json(root / name, "transforms") for split, name in names.items() if (root / name).is_file()}
+    splits = {split: _split(root, root / names[split], table) for split, table in tables.items()}
+    points, point_file = _points(root, tables["train"])
+    return Scene(
+        name=root.name,
+        root=root,
+        format="transforms",
+        train=splits["train"],
+        test=splits.get("test") or splits["train"].subset([]),
+        points=points,
+        files=tuple(files + ([point_file] if point_file else [])),
+        details={"tables": tables},
+    )
+
+
+def _split(root: Path, file: Path, table: Any) -> Split:
+    if not isinstance(table, dict) or not isinstance(table.get("frames"), list):
+        raise UserError(f"'{file}' has no list 'frames'; it should be a Blender or nerfstudio transforms file")
+    rows, names, paths, poses, times = [], [], [], [], []
+    sizes: dict[str, tuple[int, int]] = {}
+    for number, frame in enumerate(table["frames"]):
+        if not isinstance(frame, dict) or not isinstance(frame.get("file_path"), str):
+            raise UserError(f"'{file}': frame {number} has no file_path")
+        name = frame["file_path"]
+        path = _image(root, name, file)
+        rows.append(_intrinsics({**table, **frame}, name, path, file, sizes))
+        poses.append(_pose(frame, name, file))
+        names.append(name)
+        paths.append(path)
+        times.append(frame.get("time"))
+    values = np.array(rows, dtype=np.float64).reshape(-1, 10)
+    cameras = Cameras(
+        c2w=np.array(poses, dtype=np.float64).reshape(-1, 4, 4),
+        fx=values[:, 0],
+        fy=values[:, 1],
+        cx=values[:, 2],
+        cy=values[:, 3],
+        width=values[:, 4].astype(np.int64),
+        height=values[:, 5].astype(np.int64),
+        distortion=values[:, 6:] if values[:, 6:].any() else None,
+    )
+    timed = times and all(isinstance(time, (int, float)) for time in times)
+    return Split(tuple(names), tuple(paths), cameras, np.array(times, dtype=np.float64) if timed else None)
+
+
+def _image(root: Path, name: str, file: Path) -> Path:
+    pure = PurePosixPath(name)
+    if pure.is_absolute() or ".." in pure.parts or "\0" in name:
+        raise UserError(f"'{file}': file_path '{name}' leaves the scene folder")
+    path = root / pure
+    if path.is_file() or pure.suffix:
+        return path
+    return next(
+        (path.with_name(path.name + end) for end in SUFFIXES if path.with_name(path.name + end).is_file()), path
+    )
+
+
+def _pose(frame: dict, name: str, file: Path) -> np.ndarray:
+    try:
+        pose = np.array(frame["transform_matrix"], dtype=np.float64)
+    except (KeyError, TypeError, ValueError):
+        raise UserError(f"'{file}': frame '{name}' has no transform_matrix of numbers") from None
+    if pose.shape != (4, 4):
+        raise UserError(f"'{file}': the transform_matrix of frame '{name}' is {pose.shape}, expected 4 x 4")
+    return pose
+
+
+def _intrinsics(table: dict, name: str, path: Path, file: Path, sizes: dict[str, tuple[int, int]]) -> list[float]:
+    try:
+        width, height = (float(table[key]) if key in table else 0.0 for key in ("w", "h"))
+        if not width or not height:
+            width, height = _size(path, sizes)
+        if "fl_x" in table:
+            fx = float(table["fl_x"])
+            fy = float(table.get("fl_y", fx))
+        elif "camera_angle_x" in table:
+            fx = 0.5 * width / math.tan(0.5 * float(table["camera_angle_x"]))
+            angle_y = table.get("camera_angle_y")
+            fy = 0.5 * height / math.tan(0.5 * float(angle_y)) if angle_y is not None else fx
+        else:
+            raise UserError(f"'{file}': frame '{name}' has neither fl_x nor camera_angle_x")
+        cx, cy = float(table.get("cx", width / 2)), float(table.get("cy", height / 2))
+        lens = [float(table.get(key, 0.0)) for key in ("k1", "k2", "p1", "p2")]
+    except (TypeError, ValueError, ZeroDivisionError, OverflowError):
+        raise UserError(f"'{file}': the intrinsics of frame '{name}' are no numbers") from None
+    if not all(map(math.isfinite, (width, height))) or max(width, height) > 1e6:
+        raise UserError(f"'{file}': frame '{name}' is {width} x {height} pixels")
+    return [fx, fy, cx, cy, width, height, *lens]
+
+
+def _size(path: Path, sizes: dict[str, tuple[int, int]]) -> tuple[int, int]:
+    """Size of the first image stands for its folder: reading every header of a long capture takes minutes."""
+    from PIL import Image
+
+    folder = str(path.parent)
+    if folder not in sizes:
+        try:
+            with Image.open(path) as image:
+                sizes[folder] = image.size
+        except FileNotFoundError:
+            raise UserError(f"image '{path}' is missing") from None
+        except (OSError, SyntaxError) as error:
+            raise UserError(f"image '{path}' cannot be read: {error}") from None
+    return sizes[folder]
+
+
+def _points(root: Path, table: dict) -> tuple[Points | None, Path | None]:
+    from viewbench.scenes.ply import read_points
+
+    named = table.get("ply_file_path")
+    candidates = ["points3d.ply", "points3D.ply", "sparse_pc.ply"]
+    if isinstance(named, str):
+        candidates.insert(0, named)
+    for name in candidates:
+        pure = PurePosixPath(name)
+        if (root / pure).is_file() and not pure.is_absolute() and ".." not in pure.parts:
+            return read_points(root / pure), root / pure
+    return None, None

@@ -1,0 +1,59 @@
+"""Opens a scene by name or path: finds its format, reads it, checks it and makes the test split."""
+
+import dataclasses
+from pathlib import Path
+
+from viewbench.common import plugins
+from viewbench.common.errors import UserError, nearest
+from viewbench.common.settings import PACKAGE, SceneEntry, Settings
+from viewbench.scenes.splits import hold_out
+from viewbench.scenes.types import Scene
+from viewbench.scenes.validate import check_scene
+
+FORMATS = "scenes.formats"
+
+
+def open_scene(name_or_path: str, settings: Settings, format: str | None = None, holdout: str | None = None) -> Scene:
+    """The scene that `environment.toml` calls by this name, or the one in this folder.
+
+    `format` forces a reader, `holdout` a test split ("every:8", "blocks:8", "none") where the format has none.
+    Raises UserError for an unknown name, a folder in no known format, and whatever is wrong with its contents.
+    """
+    entry = settings.scenes.get(name_or_path)
+    root = _folder(name_or_path, entry, settings)
+    chosen = format or (entry.format if entry else "") or detect(root)
+    scene = plugins.load(FORMATS, chosen).read(root)
+    scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name)
+    scene = hold_out(scene, holdout or (entry.holdout if entry else "") or "none")
+    check_scene(scene)
+    return scene
+
+
+def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
+    if entry is None:
+        if Path(name).exists():
+            return Path(name)
+        known = list(settings.scenes)
+        raise UserError(
+            f"no folder and no scene of {settings.source} is called '{name}'{nearest(name, known)} "
+            f"(scenes: {', '.join(known)})"
+        )
+    if entry.path.startswith("package:"):
+        return PACKAGE / entry.path.removeprefix("package:")
+    path = Path(entry.path).expanduser()
+    if not path.is_absolute():
+        if not settings.data.root:
+            raise UserError(f"scene '{name}' is below data.root, which is not set; set VIEWBENCH_DATA or data.root")
+        path = Path(settings.data.root).expanduser() / path
+    if not path.exists():
+        raise UserError(f"scene '{name}' should be in '{path}', which is not there; correct data.root or its path")
+    return path
+
+
+def detect(root: Path) -> str:
+    """Name of the format of the folder. Raises UserError when none knows it."""
+    for name in plugins.names(FORMATS):
+        if plugins.load(FORMATS, name).detect(root):
+            return name
+    known = ", ".join(plugins.names(FORMATS))
+    raise UserError(f"'{root}' is in no known format ({known}); see `viewbench list formats`, or force one by --format")

@@ -1,0 +1,25 @@
+"""Point clouds in PLY files."""
+
+from pathlib import Path
+
+import numpy as np
+
+from viewbench.common.errors import UserError
+from viewbench.scenes.types import Points
+
+
+def read_points(path: Path) -> Points:
+    """Positions and colours (grey where there are none). Raises UserError for a file that is no point cloud."""
+    from plyfile import PlyData, PlyParseError
+
+    try:
+        vertex = PlyData.read(path)["vertex"]
+        xyz = np.stack([vertex[axis] for axis in "xyz"], axis=1).astype(np.float64)
+        named = {prop.name for prop in vertex.properties}
+        channels = ("red", "green", "blue")
+        rgb = np.full((len(xyz), 3), 128, dtype=np.uint8)
+        if set(channels) <= named:
+            rgb = np.stack([vertex[channel] for channel in channels], axis=1).astype(np.uint8)
+    except (PlyParseError, KeyError, ValueError, OSError, EOFError) as error:
+        raise UserError(f"points '{path}' cannot be read as PLY: {error}") from None
+    return Points(xyz, rgb)

@@ -1,0 +1,42 @@
+"""Checks what a reader returned, so that a broken capture ends in a sentence and not in a bad model."""
+
+import numpy as np
+
+from viewbench.common.errors import UserError
+from viewbench.scenes.types import Scene, Split
+
+RIGID = 1e-3  # largest deviation of RᵀR from the identity; poses are often written with a few digits
+
+
+def check_scene(scene: Scene) -> None:
+    """Raises UserError for no frames, duplicate names, poses that are not rigid or finite, and bad intrinsics."""
+    if not len(scene.train):
+        raise UserError(f"scene '{scene.name}' has no training views in '{scene.root}'")
+    names = [*scene.train.names, *scene.test.names]
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise UserError(f"scene '{scene.name}': frame '{twice}' is listed twice; frame names must be unique")
+    for split in (scene.train, scene.test):
+        _check_split(scene, split)
+    if scene.points is not None and not np.isfinite(scene.points.xyz).all():
+        raise UserError(f"scene '{scene.name}': its points have NaN or infinite coordinates; clean the point file")
+
+
+def _check_split(scene: Scene, split: Split) -> None:
+    cameras = split.cameras
+    bad = ~np.isfinite(cameras.c2w).all(axis=(1, 2))
+    if bad.any():
+        raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' has NaN or infinite entries")
+    gram = cameras.rotations.transpose(0, 2, 1) @ cameras.rotations
+    bad = np.abs(gram - np.eye(3)).max(axis=(1, 2), initial=0) > RIGID
+    bad |= np.linalg.det(cameras.rotations) < 0
+    if bad.any():
+        raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' is no rigid motion")
+    sizes = np.stack([cameras.fx, cameras.fy, cameras.width, cameras.height])
+    bad = ~((sizes > 0) & np.isfinite(sizes)).all(axis=0) | ~np.isfinite(cameras.cx + cameras.cy)
+    if bad.any():
+        raise UserError(f"scene '{scene.name}': frame '{_first(split, bad)}' has a focal length or size of zero or NaN")
+
+
+def _first(split: Split, bad: np.ndarray) -> str:
+    return split.names[int(np.flatnonzero(bad)[0])]
