@@ -6,7 +6,9 @@ anything. Three layouts, by the names that `viewbench list formats` uses:
     transforms   transforms.json, images/            nerfstudio, instant-ngp, OpenSplat: intrinsics of each frame
     blender      transforms_{train,test}.json,
                  images/, points3d.ply               the 3DGS authors' code: one field of view, centred
-    colmap       sparse/0/*.txt, images/             3DGS and many more: pinhole or OpenCV cameras
+    colmap       sparse/0/*.txt, images/             3DGS and many more: a pinhole camera for each frame
+
+Lens distortion has been taken out of the pictures that backends get, so that no layout needs to tell of it.
 """
 
 from collections.abc import Iterable
@@ -71,20 +73,19 @@ def transforms(cameras: Cameras, points: bool = False) -> dict[str, Any]:
     """
     frames = []
     for index, camera in enumerate(cameras):
-        frame: dict[str, Any] = {
-            "file_path": f"images/{image_name(index)}",
-            "w": int(camera.width[0]),
-            "h": int(camera.height[0]),
-            "fl_x": float(camera.fx[0]),
-            "fl_y": float(camera.fy[0]),
-            "cx": float(camera.cx[0]),
-            "cy": float(camera.cy[0]),
-        }
-        if camera.distortion is not None:
-            frame |= dict(zip(("k1", "k2", "p1", "p2"), camera.distortion[0].tolist(), strict=True))
-        frames.append({**frame, "transform_matrix": camera.c2w[0].tolist()})
-    model = "PINHOLE" if cameras.distortion is None else "OPENCV"
-    return {"camera_model": model, **({"ply_file_path": POINTS} if points else {}), "frames": frames}
+        frames.append(
+            {
+                "file_path": f"images/{image_name(index)}",
+                "w": int(camera.width[0]),
+                "h": int(camera.height[0]),
+                "fl_x": float(camera.fx[0]),
+                "fl_y": float(camera.fy[0]),
+                "cx": float(camera.cx[0]),
+                "cy": float(camera.cy[0]),
+                "transform_matrix": camera.c2w[0].tolist(),
+            }
+        )
+    return {"camera_model": "PINHOLE", **({"ply_file_path": POINTS} if points else {}), "frames": frames}
 
 
 def _blender(cameras: Cameras) -> dict[str, Any]:
@@ -93,7 +94,7 @@ def _blender(cameras: Cameras) -> dict[str, Any]:
     one_size = len({*zip(cameras.width.tolist(), cameras.height.tolist(), strict=True)}) == 1
     off = np.maximum(np.abs(cameras.cx - cameras.width / 2), np.abs(cameras.cy - cameras.height / 2))
     square = np.allclose(cameras.fx, cameras.fy, rtol=1e-3)
-    if not (one_size and square and np.allclose(angles, angles[0], rtol=1e-4) and cameras.distortion is None):
+    if not (one_size and square and np.allclose(angles, angles[0], rtol=1e-4)):
         raise UserError("format 'blender' knows one camera with square pixels for all frames; set format to 'colmap'")
     if off.max() > 0.5:
         raise UserError(
@@ -117,12 +118,8 @@ def _write_colmap(folder: Path, cameras: Cameras, points: tuple[np.ndarray, np.n
     folder.mkdir(parents=True)
     camera_lines, image_lines = [], []
     for index, camera in enumerate(cameras):
-        values = [camera.fx[0], camera.fy[0], camera.cx[0], camera.cy[0]]
-        if camera.distortion is not None:
-            values += camera.distortion[0].tolist()
-        model = "PINHOLE" if camera.distortion is None else "OPENCV"
-        numbers = " ".join(repr(float(value)) for value in values)
-        camera_lines.append(f"{index + 1} {model} {camera.width[0]} {camera.height[0]} {numbers}\n")
+        numbers = " ".join(repr(float(values[0])) for values in (camera.fx, camera.fy, camera.cx, camera.cy))
+        camera_lines.append(f"{index + 1} PINHOLE {camera.width[0]} {camera.height[0]} {numbers}\n")
         w2c = camera.world_to_camera()[0]
         pose = " ".join(repr(float(value)) for value in [*quaternion(w2c[:3, :3]), *w2c[:3, 3]])
         image_lines.append(f"{index + 1} {pose} {index + 1} {image_name(index)}\n\n")

@@ -30,6 +30,7 @@ class Capabilities:
     iterations: bool = True  # obeys Budget.iterations
     seconds: bool = True  # obeys Budget.seconds
     resumes: bool = False  # takes up a killed run where it was
+    deterministic: bool = True  # same seed and threads, same model
     default_iterations: int = 30_000  # where a command line names no budget; 30,000 is the 3DGS paper's
     options: dict[str, Any] = field(default_factory=dict)  # its options with their defaults
 

@@ -71,6 +71,7 @@ class External:
             device=self.entry.device,
             iterations="iterations" in places,
             seconds="seconds" in places,
+            deterministic=False,  # nobody knows
             options={"points": "scene"},
         )
 

@@ -124,7 +124,7 @@ def _facts(study: Study) -> list[tuple[str, str]]:
         ("Page made on", f"{here['cpu']}, {here['cpus']} CPUs, {here['system']}, Python {here['python']}"),
         ("viewbench", and_list(in_order(cell.viewbench for cell in study.done)) or __version__),
         ("Commit", and_list(in_order(cell.commit for cell in study.done if cell.commit))),
-        ("Results of", _date(study.folder / "results.csv")),
+        ("Results gathered", _date(study.folder / "results.csv")),
     ]
     return [(what, value) for what, value in facts if value]
 

@@ -4,6 +4,8 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 
+from viewbench.reports._statistics import Summary
+
 FOLDER = Path(__file__).parent / "published"
 SAMPLES = 5  # sample sets behind each published mean
 ONE_SAMPLE = "coverage"  # has no randomness: its printed ± 0.00 is one sample
@@ -67,6 +69,11 @@ def ablations() -> list[Ablation]:
 def selection_seconds() -> dict[tuple[str, str], str]:
     """Seconds of choosing by (selector, dataset), as printed ("<1")."""
     return {(row["selector"], row["dataset"]): row["seconds"] for row in _rows("selection_time")}
+
+
+def summary_of(score: Score) -> Summary:
+    """The figure with the number of samples behind it."""
+    return Summary(score.psnr_db, score.psnr_std_db, 1 if score.psnr_std_db is None else SAMPLES)
 
 
 def _rows(name: str) -> list[dict[str, str]]:

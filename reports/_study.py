@@ -19,8 +19,6 @@ OK = "ok"
 class Cell:
     """One row of results.csv. Figures are None where the cell failed or the metric was not computed."""
 
-    study: str
-    dataset: str
     scene: str
     backend: str
     selector: str
@@ -34,7 +32,6 @@ class Cell:
     select_s: float | None
     train_s: float | None
     evaluate_s: float | None
-    iterations: int | None
     peak_rss_bytes: int | None
     commit: str
     scene_sha256: str
@@ -59,7 +56,6 @@ class SceneInfo:
     name: str
     n_train: int
     n_test: int
-    train_names: tuple[str, ...]
     train_positions: list[list[float]]  # (n_train, 3) scene units
     train_forward: list[list[float]]  # (n_train, 3) unit viewing directions
     test_positions: list[list[float]]  # (n_test, 3)
@@ -138,7 +134,6 @@ class Study:
                 name=name,
                 n_train=record["n_train"],
                 n_test=record["n_test"],
-                train_names=tuple(record["train"]["names"]),
                 train_positions=record["train"]["positions"],
                 train_forward=record["train"]["forward"],
                 test_positions=record["test"]["positions"],
@@ -218,8 +213,6 @@ def failures_note(study: Study) -> str:
 
 def _cell(row: dict[str, str], folder: Path) -> Cell:
     return Cell(
-        study=row["study"],
-        dataset=row["dataset"],
         scene=row["scene"],
         backend=row["backend"],
         selector=row["selector"],
@@ -233,7 +226,6 @@ def _cell(row: dict[str, str], folder: Path) -> Cell:
         select_s=_number(row["select_s"]),
         train_s=_number(row["train_s"]),
         evaluate_s=_number(row["evaluate_s"]),
-        iterations=_whole_number(row["iterations"]),
         peak_rss_bytes=_whole_number(row["peak_rss_bytes"]),
         commit=row["commit"],
         scene_sha256=row["scene_sha256"],

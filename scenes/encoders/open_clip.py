@@ -1,0 +1,53 @@
+"""Any image encoder of open_clip, as open_clip:MODEL/TAG; the paper's is ViT-SO400M-14-SigLIP-384/webli."""
+
+import importlib.util
+from collections.abc import Callable
+
+import numpy as np
+
+from viewbench.common.errors import UserError
+
+DEFAULT = "ViT-SO400M-14-SigLIP-384/webli"
+
+
+def available() -> str | None:
+    """Why the encoder cannot be used here, or None; whether its weights are in reach shows when they are asked for."""
+    return None if importlib.util.find_spec("open_clip") else "pip install open_clip_torch"
+
+
+def encoder(argument: str) -> tuple[int, str, Callable[[np.ndarray], np.ndarray]]:
+    """(input size in pixels, version, encode): encode maps (B, S, S, 3) in [0, 1] to (B, D) float32.
+
+    `argument` is MODEL/TAG, where TAG names pretrained weights or is the path of a file. Raises UserError for an
+    unknown model or tag and for weights that are neither on disk nor in reach of a hub.
+    """
+    from viewbench.common.torchvision_cpu import import_torchvision
+
+    import_torchvision()
+    import open_clip
+    import torch
+
+    name, _, tag = (argument or DEFAULT).partition("/")
+    if name not in open_clip.list_models():
+        raise UserError(f"open_clip has no model '{name}'; `python -m open_clip.list_models` lists them")
+    if not tag:
+        raise UserError(f"encoder 'open_clip:{argument}' names no weights; write open_clip:MODEL/TAG")
+    try:
+        model, _, _ = open_clip.create_model_and_transforms(name, pretrained=tag)
+    except Exception as error:  # hubs fail in many ways: no network, no such file, no such tag
+        words = (str(error).splitlines() or [type(error).__name__])[0]
+        raise UserError(
+            f"weights '{tag}' of open_clip's {name} are not in reach ({words[:160]}); "
+            "put them on disk and name the file, or use the encoder efficientnet-lite0"
+        ) from None
+    model.eval()
+    settings = open_clip.get_model_preprocess_cfg(model)
+    size = settings["size"] if isinstance(settings["size"], int) else int(settings["size"][0])
+    mean, spread = (torch.tensor(settings[key]).view(1, 3, 1, 1) for key in ("mean", "std"))
+
+    def encode(images: np.ndarray) -> np.ndarray:
+        batch = torch.from_numpy(np.ascontiguousarray(images.transpose(0, 3, 1, 2)))
+        with torch.inference_mode():
+            return model.encode_image((batch - mean) / spread).float().numpy()
+
+    return size, f"open_clip {open_clip.__version__} {name}/{tag}", encode

@@ -1,0 +1,187 @@
+"""gsplat's trainer end to end without a GPU: gsplat's own strategies, our loop, and a stand-in for its CUDA kernels."""
+
+import dataclasses
+import inspect
+
+import numpy as np
+import pytest
+
+from tests.backends.gsplat import standin
+from viewbench.backends import _gaussian_ply, gsplat
+from viewbench.backends._psnr import psnr_db
+from viewbench.backends._types import Budget, Report
+from viewbench.common.errors import UserError
+
+torch = pytest.importorskip("torch")
+real = pytest.importorskip("gsplat", reason="gsplat is not installed (pip install 'viewbench[gpu]')")
+
+from viewbench.backends.gsplat import trainer  # noqa: E402 - it imports torch
+
+BACKEND = gsplat.Gsplat(device="cpu", rasterize=standin.rasterization)
+OPTIONS = {**BACKEND.CAPABILITIES.options, "points": "random", "random_points": 150}
+
+
+@pytest.fixture(autouse=True)
+def _one_thread():
+    torch.set_num_threads(1)
+
+
+@pytest.fixture
+def no_kernels(monkeypatch):
+    """gsplat's strategies with the two CUDA functions that they call done in torch."""
+    from gsplat.cuda._torch_impl import _quat_scale_to_covar_preci
+    from gsplat.strategy import ops
+
+    monkeypatch.setattr(ops, "compute_relocation", standin.relocation)
+    monkeypatch.setattr(ops, "quat_scale_to_covar_preci", _quat_scale_to_covar_preci)
+
+
+def train(views, out, steps=40, seed=0, report=None, budget=None, **options):
+    out.mkdir()
+    budget = budget or Budget(iterations=steps)
+    return BACKEND.train(views, out, seed, budget, {**OPTIONS, **options}, report or Report())
+
+
+def test_the_package_inside_the_backend_is_the_real_one():
+    assert not real.__name__.startswith("viewbench")
+    assert gsplat.__name__ == "viewbench.backends.gsplat"
+    assert callable(real.rasterization)
+
+
+def test_the_stand_in_s_arguments_are_the_real_function_s():
+    ours = inspect.signature(standin.rasterization).parameters
+    theirs = standin.signature_of_the_real_one().parameters
+    assert list(ours) == [name for name in theirs if name in ours]
+    for name, parameter in ours.items():
+        assert parameter.default == theirs[name].default, name
+
+
+@pytest.mark.parametrize("strategy", ["default", "mcmc"])
+def test_training_views_are_learnt(take_views, tmp_path, no_kernels, strategy):
+    views = take_views(width=24)
+    trained = train(views, tmp_path / "m", steps=150, strategy=strategy, sh_degree=1)
+    assert trained.iterations == 150
+    assert trained.n_primitives == len(_gaussian_ply.load(tmp_path / "m" / "model.ply"))
+    renders = list(BACKEND.render(tmp_path / "m", views.cameras))
+    mean_colour = views.images.mean(axis=(1, 2), keepdims=True) + np.zeros_like(views.images)
+    for render, flat, view in zip(renders, mean_colour, views.images, strict=True):
+        assert psnr_db(render, view) > psnr_db(flat, view) + 2
+
+
+@pytest.mark.parametrize("strategy", ["default", "mcmc"])
+def test_gaussians_are_added_and_their_optimizers_follow(take_views, tmp_path, no_kernels, strategy):
+    trained = train(take_views(width=24), tmp_path / "m", steps=60, strategy=strategy)
+    assert trained.n_primitives != 150
+    assert np.isfinite(_gaussian_ply.load(tmp_path / "m" / "model.ply").means).all()
+
+
+def test_mcmc_stays_below_its_cap(take_views, tmp_path, no_kernels):
+    trained = train(take_views(width=24), tmp_path / "m", steps=80, strategy="mcmc", cap=155)
+    assert trained.n_primitives == 155
+
+
+def test_opacities_are_reset_on_schedule(take_views):
+    """gsplat 1.5.3 alone never resets them."""
+    views = take_views(width=24)
+    params = trainer.parameters(
+        trainer.starting(np.random.default_rng(0).normal(size=(20, 3)), np.zeros((20, 3)), "default", 0, 1.0), "cpu"
+    )
+    optims = trainer.optimizers(params, 1.0)
+    densification = trainer.Densification(OPTIONS, params, optims, 1.0, 30_000)
+    with torch.no_grad():
+        params["opacities"].fill_(5.0)
+    renderer = trainer.Renderer(standin.rasterization, "cpu", "black", 0.0)
+    for step, highest in ((2999, 0.99), (3000, 0.01)):
+        image, info = renderer.render(params, views.cameras[0], 0)
+        densification.before_backward(step, info)
+        image.sum().backward()
+        densification.strategy.refine_every = 10**9
+        densification.after_step(step, info)
+        assert float(params["opacities"].sigmoid().max()) == pytest.approx(highest, abs=0.01)
+    assert optims["opacities"].param_groups[0]["params"][0] is params["opacities"]
+
+
+def test_the_schedule_is_squeezed_with_the_run():
+    params = trainer.parameters(trainer.starting(np.eye(3), np.zeros((3, 3)), "default", 0, 1.0), "cpu")
+    optims = trainer.optimizers(params, 1.0)
+    for steps, start, every, stop in ((30_000, 500, 100, 15_000), (3000, 50, 10, 1500)):
+        strategy = trainer.Densification(OPTIONS, params, optims, 2.0, steps).strategy
+        assert (strategy.refine_start_iter, strategy.refine_every, strategy.refine_stop_iter) == (start, every, stop)
+    state = trainer.Densification(OPTIONS, params, optims, 2.0, 3000).state
+    assert state["scene_scale"] == 2.0
+    assert "binoms" in trainer.Densification({**OPTIONS, "strategy": "mcmc"}, params, optims, 2.0, 3000).state
+
+
+def test_same_seed_same_model_on_one_cpu_thread(take_views, tmp_path):
+    views = take_views(width=24)
+    for name, seed in (("a", 3), ("b", 3), ("c", 4)):
+        train(views, tmp_path / name, steps=30, seed=seed)
+    a, b, c = ((tmp_path / name / "model.ply").read_bytes() for name in "abc")
+    assert a == b
+    assert a != c
+
+
+def test_curve_and_seconds_leave_the_probe_out(take_views, tmp_path):
+    import time
+
+    views = take_views(width=24)
+
+    def probe(render):
+        time.sleep(0.2)
+        return psnr_db(next(iter(render(views.cameras))), views.images[0])
+
+    trained = train(views, tmp_path / "m", steps=20, report=Report(probe=probe), random_points=10)
+    assert [point["step"] for point in trained.curve] == list(range(1, 21))
+    assert trained.seconds < 20 * 0.2
+    assert all(np.isfinite(point["test_psnr_db"]) for point in trained.curve)
+    assert np.all(np.diff([point["seconds"] for point in trained.curve]) > 0)
+
+
+def test_seconds_end_a_run(take_views, tmp_path):
+    trained = train(take_views(width=24), tmp_path / "m", budget=Budget(seconds=0.3), random_points=10)
+    assert 0 < trained.iterations < trainer.PAPER_STEPS
+
+
+@pytest.mark.parametrize(("background", "level"), [("white", 1.0), ("black", 0.0)])
+def test_background_is_kept_with_the_model(take_views, tmp_path, background, level):
+    views = take_views(width=24)
+    train(views, tmp_path / "m", steps=1, background=background, random_points=1)
+    away = dataclasses.replace(views.cameras, c2w=views.cameras.c2w @ np.diag([-1.0, 1, -1, 1]))
+    empty = [image for image in BACKEND.render(tmp_path / "m", away) if np.ptp(image) == 0]
+    assert all(np.all(image == level) for image in empty)
+    assert empty
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"strategy": "mcmd"}, "'mcmd', expected 'default' or 'mcmc'"),
+        ({"background": "grey"}, "'black' or 'white'"),
+        ({"sh_degree": 4}, "expected 0 to 3"),
+        ({"cap": 0}, "expected a positive number"),
+        ({"points": "scenes"}, "did you mean 'scene'"),
+        ({"points": "selected"}, "no point tracks"),
+    ],
+)
+def test_what_it_cannot_do_is_refused_in_one_sentence(take_views, tmp_path, options, message):
+    with pytest.raises(UserError, match=message):
+        train(take_views(width=24), tmp_path / "m", **options)
+
+
+def test_full_memory_is_said_to_be_so(take_views, tmp_path):
+    def full(**arguments):
+        raise torch.OutOfMemoryError("CUDA out of memory")
+
+    (tmp_path / "m").mkdir()
+    backend = gsplat.Gsplat(device="cpu", rasterize=full)
+    with pytest.raises(UserError, match="memory is full with 150 Gaussians and 3 views of 24 pixels"):
+        backend.train(take_views(width=24), tmp_path / "m", 0, Budget(iterations=5), OPTIONS, Report())
+    assert not list((tmp_path / "m").iterdir())
+
+
+def test_absent_cuda_is_explained():
+    if torch.cuda.is_available():
+        pytest.skip("there is a CUDA device here")
+    assert "CUDA" in gsplat.Gsplat().available()
+    assert "[compute] device is 'cpu'" in gsplat.Gsplat(device="cpu").available()
+    assert gsplat.Gsplat().version().startswith("gsplat 1.")

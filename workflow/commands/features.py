@@ -1,0 +1,29 @@
+"""Embed the training views once, for the semantic factor."""
+
+from pathlib import Path
+
+import click
+
+from viewbench.workflow.commands import _options
+
+
+@click.command()
+@_options.scene_argument
+@_options.encoder_option
+@click.option("--out", type=click.Path(path_type=Path), help="Also write them as N x D array to this .npy file.")
+@_options.format_option
+@_options.holdout_option
+def command(scene: str, encoder: str | None, out: Path | None, format_: str | None, holdout: str | None) -> None:
+    """Embed the training views of SCENE; what is in the cache already is not embedded again."""
+    from viewbench.common import settings as settings_file
+    from viewbench.scenes import features
+    from viewbench.scenes.load import open_scene
+
+    settings = settings_file.load()
+    opened = open_scene(scene, settings, format=format_, holdout=holdout)
+    name = encoder or settings.features.encoder
+    cache = Path(settings.features.cache)
+    rows = features.features(opened.train, name, cache, settings.features.batch, _options.progress("features"))
+    if out is not None:
+        features.save(out, rows)
+    click.echo(f"{len(rows)} x {rows.shape[1]} features by {name}")
