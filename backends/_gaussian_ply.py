@@ -78,4 +78,4 @@ def load(path: Path) -> Gaussians:
         raise UserError(f"model '{path}' is not a PLY file of 3D Gaussians: {error}") from None
     columns = columns.astype(np.float32)
     means, sh0, shn, opacities, scales, quats = np.split(columns, np.cumsum([3, 3, 3 * rest, 1, 3]), axis=1)
-    return Gaussians(means, scales, quats, opacities[:, 0], sh0, shn.reshape(-1, 3, rest).transpose(0, 2, 1))
+    return Gaussians(means, scales, quats, opacities[:, 0], sh0, shn.reshape(len(shn), 3, rest).transpose(0, 2, 1))

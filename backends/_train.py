@@ -16,7 +16,7 @@ from viewbench.backends._psnr import psnr_db
 from viewbench.backends._types import Budget, Probe, Report, Trained, TrainingSet
 from viewbench.common.errors import UserError, nearest
 from viewbench.common.files import read_json, write_json
-from viewbench.common.provenance import commit
+from viewbench.common.provenance import commit, machine
 from viewbench.common.seeding import seed_of
 from viewbench.common.settings import Settings
 from viewbench.scenes.images import load_images
@@ -190,6 +190,7 @@ def _record(trained: Trained, asked: dict[str, Any], selection: dict[str, Any]) 
         "width": asked["width"],
         "options": asked["options"],
         "notes": trained.notes,
+        "machine": machine(),
         "commit": commit(),
         "viewbench": __version__,
     }

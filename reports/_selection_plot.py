@@ -40,7 +40,7 @@ def _from_above(path: Path, title: str, positions: np.ndarray, forward: np.ndarr
         figure, (axes,) = grid(1, 6.5, 6.5)
         for piece in pieces(flat):
             axes.plot(*piece.T, color=GREY, linewidth=0.8, zorder=1)
-        axes.scatter(*flat.T, s=4, color=GREY, zorder=1, label=f"all {len(positions)} frames")
+        axes.scatter(flat[:, 0], flat[:, 1], s=4, color=GREY, zorder=1, label=f"all {len(positions)} frames")
         axes.quiver(
             *flat[chosen].T,
             *looks[chosen].T,
@@ -51,7 +51,7 @@ def _from_above(path: Path, title: str, positions: np.ndarray, forward: np.ndarr
             width=0.003,
             zorder=3,
         )
-        axes.scatter(*flat[chosen].T, s=12, color=CHOSEN, zorder=3, label=f"{len(chosen)} chosen, with their direction")
+        axes.scatter(flat[chosen, 0], flat[chosen, 1], s=12, color=CHOSEN, zorder=3, label=f"{len(chosen)} chosen, with their direction")
         axes.set_aspect("equal")
         axes.set_title(title)
         axes.set_xlabel("scene units, seen from above")

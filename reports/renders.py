@@ -82,7 +82,7 @@ def _picture(path: Path) -> np.ndarray:
 
 
 def _show(axes: Axes, picture: np.ndarray, title: str, below: str) -> None:
-    axes.imshow(picture, interpolation="nearest")
+    axes.imshow(picture)
     axes.set(xticks=[], yticks=[])
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)

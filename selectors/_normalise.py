@@ -1,16 +1,15 @@
-"""Positions as selection sees them: the training cameras' bounding box scaled to [-4, 4]."""
+"""Scales camera positions to [-4, 4], the units in which the paper's σ, α, β and γ are given."""
 
 import numpy as np
 
-EXTENT = 4.0
 
+def normalise(positions: np.ndarray) -> np.ndarray:
+    """p ← 4 (p − c) / max|p − c|, with c the middle of the cameras' bounding box; one scale for the three axes.
 
-def normalised(positions: np.ndarray) -> np.ndarray:
-    """p ← 4 (p − c) / max|p − c| with c the middle of the bounding box, one scale for the three axes.
-
-    positions: (N, 3) camera centres in scene units. Cameras in a single point stay at 0.
-    (Paper, Implementation Details: "all the camera locations are scaled to the range [-4,4]".)
+    `positions` is (N, 3) in scene units and holds the training cameras only. Cameras that all stand in one place
+    become zeros: no scale would move them apart.
     """
-    centred = positions - (positions.min(axis=0) + positions.max(axis=0)) / 2
-    extent = np.abs(centred).max()
-    return EXTENT * centred / extent if extent > 0 else centred
+    p = np.asarray(positions, dtype=np.float64)
+    p = p - (p.min(axis=0) + p.max(axis=0)) / 2
+    reach = np.abs(p).max()
+    return 4 * (p / reach) if reach > 0 else np.zeros_like(p)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from viewbench.common.errors import UserError
 from viewbench.selectors._types import Choice, Views
 
 SEEDED = False
@@ -10,5 +11,7 @@ PARAMETERS: dict = {}
 
 
 def select(views: Views, count: int, rng: np.random.Generator) -> Choice:
-    """All views; a count below their number takes the first ones."""
-    return Choice(np.arange(count, dtype=np.int64))
+    """All views. Raises UserError when fewer are asked for: that would be a choice, which `full` does not make."""
+    if count != len(views):
+        raise UserError(f"'full' takes all {len(views)} views, not {count}; use ratio 1 or another selector")
+    return Choice(np.arange(len(views)))

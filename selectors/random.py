@@ -1,4 +1,4 @@
-"""Any views, each subset as likely as any other (the paper's Random)."""
+"""Views drawn at random without repetition, the paper's Random baseline."""
 
 import numpy as np
 
@@ -10,5 +10,5 @@ PARAMETERS: dict = {}
 
 
 def select(views: Views, count: int, rng: np.random.Generator) -> Choice:
-    """The first `count` of a random permutation, so that a larger ratio adds views to those of a smaller one."""
-    return Choice(rng.permutation(len(views))[:count].astype(np.int64))
+    """The first `count` of a random order of all views, so that a larger count with the same seed adds views only."""
+    return Choice(rng.permutation(len(views))[:count])

@@ -138,8 +138,10 @@ class Wiring:
         return int(_registry.load(name, self.settings).CAPABILITIES.device == "cuda")
 
     def report_sources(self, wildcards: Any) -> list[str]:
-        """Files behind a report."""
-        return sources("reports._run", plugins.module_name("reports", wildcards.report).removeprefix("viewbench."))
+        """Files behind a report: its module and the numbers that ship with it (`reports/NAME/*`)."""
+        module = plugins.module_name("reports", wildcards.report).removeprefix("viewbench.")
+        data = PACKAGE.joinpath(*module.split("."))
+        return sources(module) + sorted(from_here(path) for path in data.rglob("*") if path.is_file())
 
     @property
     def templates(self) -> list[str]:

@@ -26,6 +26,7 @@ from viewbench.scenes.types import Cameras
 PAPER_STEPS = 30_000  # the run that the 3DGS authors' schedules are made for; shorter ones are squeezed
 SH_EVERY = 1000  # steps after which one more band of spherical harmonics takes part
 MCMC_REGULARISATION = 0.01  # weight of mean opacity and of mean scale in 3DGS-MCMC
+LEAST_REFINE = 10  # steps between densifications: gradients of fewer views say little
 NEAR = 0.01  # scene units, gsplat's own default
 CURVE_POINTS = 20
 RESIDENT_SHARE = 0.25  # of the free GPU memory that images may take; above, each is sent when it is used
@@ -80,11 +81,11 @@ class Densification:
     def __init__(self, options: dict[str, Any], params: Parameters, optims: Optimizers, extent: float, steps: int):
         from gsplat import DefaultStrategy, MCMCStrategy
 
-        def squeezed(step: int) -> int:
-            return max(1, round(step * steps / PAPER_STEPS))
+        def squeezed(step: int, least: int = 1) -> int:
+            return max(least, round(step * steps / PAPER_STEPS))
 
         self.kind = options["strategy"]
-        shared = {"refine_start_iter": squeezed(500), "refine_every": squeezed(100)}
+        shared = {"refine_start_iter": squeezed(500), "refine_every": squeezed(100, LEAST_REFINE)}
         self.strategy: Any
         if self.kind == "mcmc":
             self.strategy = MCMCStrategy(cap_max=options["cap"], refine_stop_iter=squeezed(25_000), **shared)
@@ -209,7 +210,7 @@ def _point(
     seconds = clock.stop()
     psnr = report.probe(lambda cameras: renderer.images(params, cameras, degree)) if report.probe else None
     clock.start()
-    return {"step": step, "seconds": seconds, "loss": float(value), "test_psnr_db": psnr}
+    return {"step": step, "seconds": seconds, "loss": float(value.detach()), "test_psnr_db": psnr}
 
 
 class _Clock:

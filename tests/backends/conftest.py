@@ -10,6 +10,7 @@ import pytest
 
 from viewbench.backends._types import TrainingSet
 from viewbench.common.settings import PACKAGE, Command, Settings
+from viewbench.scenes.ply import read_points
 from viewbench.scenes.types import Cameras, Points
 
 ROOM = PACKAGE / "scenes" / "generated_room" / "human"
@@ -44,9 +45,10 @@ def nearest() -> Settings:
 
 @pytest.fixture(scope="session")
 def take_views() -> Callable[..., TrainingSet]:
-    """Makes a TrainingSet of some frames of the generated room at a small size."""
+    """Makes a TrainingSet of some frames of the generated room at a small size, with 200 points; tracks made up."""
     transforms = json.loads((ROOM / "transforms_train.json").read_text(encoding="utf-8"))
     rng = np.random.default_rng(7)
+    cloud = read_points(ROOM / "points3d.ply")
 
     def take(chosen: tuple[int, ...] = (0, 130, 260), width: int = 48, seen_by: bool = False) -> TrainingSet:
         from PIL import Image
@@ -59,9 +61,10 @@ def take_views() -> Callable[..., TrainingSet]:
                 small = picture.convert("RGB").resize((width, height), Image.Resampling.BOX)
                 images.append(np.asarray(small, dtype=np.float32) / 255)
         cameras = cameras_of(np.array([frame["transform_matrix"] for frame in frames]), width, height)
-        xyz = rng.uniform(-2, 2, (200, 3))
+        some = slice(None, None, len(cloud) // 200)
+        xyz, rgb = cloud.xyz[some][:200], cloud.rgb[some][:200]
         tracks = tuple(rng.choice(400, 5, replace=False) for _ in xyz) if seen_by else None
-        points = Points(xyz, rng.integers(0, 256, (200, 3), dtype=np.uint8), tracks)
+        points = Points(xyz, rgb, tracks)
         names = tuple(frame["file_path"] for frame in frames)
         return TrainingSet("room", names, cameras, np.stack(images), points, np.array(chosen, dtype=np.int64))
 

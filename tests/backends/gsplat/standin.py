@@ -44,8 +44,11 @@ def rasterization(
         "backgrounds": (backgrounds, (1, 3)),
     }
     for name, (tensor, shape) in shapes.items():
-        assert tensor is not None and tensor.shape == shape and tensor.dtype == torch.float32, name
-    assert not packed and sh_degree is not None and (sh_degree + 1) ** 2 <= bands
+        assert tensor is not None, name
+        assert (tuple(tensor.shape), tensor.dtype) == (shape, torch.float32), name
+    assert sh_degree is not None
+    assert (sh_degree + 1) ** 2 <= bands
+    assert not packed
 
     covariances, _ = _quat_scale_to_covar_preci(quats, scales, True, False)
     radii, means2d, depths, conics, _ = _fully_fused_projection(
@@ -61,7 +64,7 @@ def rasterization(
     a, b, c = conics[0, order].unbind(-1)
     alpha = (opacities[order] * torch.exp(-0.5 * (a * dx**2 + c * dy**2) - b * dx * dy)).clamp_max(ALPHA_MAX)
     alpha = torch.where(alpha < ALPHA_MIN, torch.zeros_like(alpha), alpha)
-    passed = torch.cumprod(torch.cat([torch.ones_like(alpha[..., :1]), 1 - alpha], dim=-1), dim=-1)
+    passed = torch.cumprod(torch.cat([torch.ones(height, width, 1), 1 - alpha], dim=-1), dim=-1)
     image = (alpha * passed[..., :-1]) @ rgb[order] + passed[..., -1:] * backgrounds
     info = {"means2d": means2d, "radii": radii, "width": width, "height": height, "n_cameras": 1, "gaussian_ids": None}
     return image[None], 1 - passed[None, ..., -1:], info

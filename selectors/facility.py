@@ -1,0 +1,66 @@
+"""Views that the others resemble most: facility location, each view served by its most similar chosen one.
+
+f(S) = Σ_i max_{j ∈ S} M_ij, maximised by the lazy greedy algorithm (Minoux 1978), within 1 − 1/e of the best choice
+(Nemhauser, Wolsey and Fisher 1978); as a way of summarising data, Lin and Bilmes 2011.
+"""
+
+import time
+
+import numpy as np
+
+from viewbench.selectors._sharpness import Preference
+from viewbench.selectors._similarity import describe, similarity
+from viewbench.selectors._start import BLOCK
+from viewbench.selectors._types import Choice, Views
+
+SEEDED = False
+FACTORS = ("pos", "ang", "sem")
+PARAMETERS = {"alpha": 0.7, "beta": 0.2, "sigma": 0.5, "factors": ["pos", "ang", "sem"], "sharpness": 0.0}
+
+
+def select(
+    views: Views,
+    count: int,
+    rng: np.random.Generator,
+    alpha: float = 0.7,
+    beta: float = 0.2,
+    sigma: float = 0.5,
+    factors: tuple[str, ...] = FACTORS,
+    sharpness: float = 0.0,
+) -> Choice:
+    """Greedy maximiser of f, ties to the earlier frame; a similarity below 0 serves nobody and counts as 0.
+
+    f is submodular: a gain computed for a smaller S bounds the gain for a larger one. So only views whose bound
+    reaches the best gain are computed again, a block at a time. O(N²) time to begin with, O(N) memory.
+    """
+    begin = time.perf_counter()
+    similar = similarity(views, alpha, beta, sigma, factors)
+    prefer = Preference(views.sharpness, sharpness)
+    n = len(views)
+    served = np.zeros(n)  # max_{j ∈ S} M_ij of every view i
+    bounds = np.full(n, np.inf)  # gain of every view when it was last computed; −∞ once chosen
+    everyone = np.arange(n)
+    for block in np.split(everyone, everyone[BLOCK::BLOCK]):
+        bounds[block] = _gains(similar.columns(block), served)
+    prepared_s = time.perf_counter() - begin
+    chosen = np.empty(count, dtype=np.int64)
+    gains = np.empty(count)
+    for k in range(count):
+        fresh = np.zeros(n, dtype=bool)
+        while not fresh[pick := prefer.best(bounds)]:
+            stale = np.where(fresh, -np.inf, bounds)
+            stale[pick] = np.inf  # whatever else is computed again, the leader is
+            block = np.argpartition(stale, -min(BLOCK, n))[-min(BLOCK, n) :]
+            block = block[stale[block] > -np.inf]
+            bounds[block] = _gains(similar.columns(block), served)
+            fresh[block] = True
+        chosen[k], gains[k] = pick, bounds[pick]
+        np.maximum(served, similar.column(pick), out=served)
+        bounds[pick] = -np.inf
+        prefer.take(pick)
+    return Choice(chosen, gains, {"similarity": prepared_s}, describe(similar, alpha, beta, factors))
+
+
+def _gains(columns: np.ndarray, served: np.ndarray) -> np.ndarray:
+    """(B,) f(S ∪ {j}) − f(S) from the columns (B, N) of M."""
+    return np.maximum(columns - served, 0).sum(axis=1)
