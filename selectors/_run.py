@@ -1,7 +1,8 @@
-"""Runs one selector on a scene and returns what `selection.json` says."""
+"""Runs one selector on a scene: checks what was asked, prepares the views, times the choice, makes `selection.json`."""
 
 import math
 import time
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,18 +10,20 @@ import numpy as np
 from viewbench import __version__
 from viewbench.common import plugins
 from viewbench.common.errors import UserError, nearest
-from viewbench.common.files import plain
 from viewbench.common.seeding import generator
-from viewbench.scenes.types import Scene
-from viewbench.selectors._normalise import normalised
+from viewbench.scenes.types import Scene, Split
+from viewbench.selectors._normalise import normalise
 from viewbench.selectors._types import Views
 
 
 def count_of(ratio: float, n: int) -> int:
-    """K = max(1, round(ratio · N)), halves up. Raises UserError for a ratio outside (0, 1]."""
+    """K = max(1, round(ratio · N)); halves go to the even number, as Python's `round` has it.
+
+    Raises UserError for a ratio outside (0, 1].
+    """
     if not 0 < ratio <= 1:
-        raise UserError(f"ratio is {ratio}, expected a share of the training views in (0, 1]")
-    return min(n, max(1, math.floor(ratio * n + 0.5)))
+        raise UserError(f"ratio {ratio} must lie in (0, 1]: it is the share of the {n} training views to choose")
+    return max(1, round(ratio * n))
 
 
 def run(
@@ -32,66 +35,124 @@ def run(
     features: np.ndarray | None = None,
     sharpness: np.ndarray | None = None,
 ) -> dict[str, Any]:
-    """Chooses `count` training views and returns the record of DESIGN's `selection.json`.
+    """Chooses `count` training views and returns what `selection.json` holds.
 
-    `features` is (N, D), one row per training view in capture order; rows are scaled to length 1. The generator is
-    named by scene, selector and seed, not by the count: a greedy order serves every ratio.
-    Raises UserError for a count outside [1, N], a parameter that the selector does not have, and unfit features.
+    `features` (N, D) and `sharpness` (N,) have a row per training view in capture order. The random generator is
+    seeded by scene, selector and seed but not by the count, so that greedy orders are prefixes of each other over
+    ratios. Test views are not looked at.
+
+    Raises UserError for an unknown selector or parameter (with the nearest right one), a parameter of a wrong type, a
+    count outside [1, N], and features or sharpness of a wrong length or with NaN.
     """
-    module = plugins.load("selectors", selector)
     n = len(scene.train)
+    if n == 0:
+        raise UserError(f"scene '{scene.name}' has no training views to choose from")
     if not 1 <= count <= n:
-        raise UserError(f"count is {count}, expected 1 to {n}, the number of training views of '{scene.name}'")
-    given = dict(parameters or {})
-    for name in given:
-        if name not in module.PARAMETERS:
-            known = ", ".join(module.PARAMETERS) or "none"
-            hint = nearest(name, module.PARAMETERS)
-            raise UserError(f"selector '{selector}' has no parameter '{name}'{hint} (it has: {known})")
-    merged = {**module.PARAMETERS, **given}
-    began = time.perf_counter()
-    cameras = scene.train.cameras
-    intrinsics = [cameras.fx, cameras.fy, cameras.cx, cameras.cy, cameras.width, cameras.height]
-    views = Views(
-        positions=normalised(cameras.positions),
-        rotations=cameras.rotations,
-        features=None if features is None else unit_rows(features, n),
-        intrinsics=np.stack(intrinsics, axis=1).astype(np.float64),
-        times=scene.train.times,
-        sharpness=sharpness,
-    )
-    prepared = time.perf_counter()
-    rng = generator("select", scene.name, selector, seed)
-    choice = module.select(views, count, rng, **merged)
-    done = time.perf_counter()
-    similarity_s = prepared - began + choice.seconds.get("similarity", 0.0)
+        raise UserError(f"count {count} must lie in [1, {n}]: scene '{scene.name}' has {n} training views")
+    plugin = plugins.load("selectors", selector)
+    selector = selector.replace("_", "-")
+    options = _options(selector, plugin.PARAMETERS, parameters or {})
+    if options.get("sharpness") and sharpness is None:
+        raise UserError(f"'{selector}' was asked to weigh sharpness, but the sharpness of the frames was not given")
+    views = _views(scene.train, features, sharpness)
+    begin = time.perf_counter()
+    choice = plugin.select(views, count, generator("select", scene.name, selector, seed), **options)
+    elapsed = time.perf_counter() - begin
+    similarity_s = choice.seconds.get("similarity", 0.0)
+    indices = [int(i) for i in choice.indices]
     record = {
         "schema": 1,
         "scene": scene.name,
         "selector": selector,
-        "parameters": merged,
+        "parameters": options,
         "seed": seed,
         "n_views": n,
         "count": count,
-        "indices": choice.indices,
-        "names": [scene.train.names[i] for i in choice.indices],
-        "gains": choice.gains,
-        "seconds": {"similarity": similarity_s, "select": done - prepared - choice.seconds.get("similarity", 0.0)},
+        "indices": indices,
+        "names": [scene.train.names[i] for i in indices],
+        "gains": None if choice.gains is None else [float(gain) for gain in choice.gains],
+        "seconds": {
+            "similarity": similarity_s,
+            "select": choice.seconds.get("select", elapsed - similarity_s),
+        },
         "viewbench": __version__,
     }
-    if choice.notes:
-        record["notes"] = dict(choice.notes)
-    return plain(record)
+    return record | ({"notes": dict(choice.notes)} if choice.notes else {})
 
 
-def unit_rows(features: np.ndarray, n: int) -> np.ndarray:
-    """(N, D) float32 rows of length 1. Raises UserError for another length, NaN, or a row of zeros."""
-    if features.ndim != 2 or len(features) != n:
-        raise UserError(f"features are {features.shape}, expected one row for each of the {n} training views")
-    if not np.isfinite(features).all():
-        row = int(np.flatnonzero(~np.isfinite(features).all(axis=1))[0])
-        raise UserError(f"features have NaN or infinite entries, first in row {row}")
-    length = np.linalg.norm(features, axis=1, keepdims=True)
-    if (length == 0).any():
-        raise UserError(f"features have a row of zeros, row {int(np.argmin(length))}; it has no direction")
-    return (features / length).astype(np.float32)
+def _views(train: Split, features: np.ndarray | None, sharpness: np.ndarray | None) -> Views:
+    cameras = train.cameras
+    bad = np.flatnonzero(~np.isfinite(cameras.c2w).all(axis=(1, 2)))
+    if len(bad):
+        raise UserError(f"frame '{train.names[bad[0]]}' has a pose with NaN or infinity; remove it from the capture")
+    intrinsics = (cameras.fx, cameras.fy, cameras.cx, cameras.cy, cameras.width, cameras.height)
+    return Views(
+        positions=normalise(cameras.positions),
+        rotations=np.ascontiguousarray(cameras.rotations, dtype=np.float64),
+        features=None if features is None else unit_rows(features, train.names),
+        intrinsics=np.stack(intrinsics, axis=1).astype(np.float64),
+        times=train.times,
+        sharpness=None if sharpness is None else _per_frame(sharpness, train.names),
+    )
+
+
+def unit_rows(features: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """(N, D) float32 rows of length 1, in place of what a user or an encoder gives.
+
+    Raises UserError for another shape than one row per name, and names the frame of a row with NaN or of zeros.
+    """
+    features = np.asarray(features)
+    n = len(names)
+    if features.ndim != 2 or len(features) != n or features.shape[1] == 0 or features.dtype.kind not in "fiu":
+        raise UserError(
+            f"the features are {features.dtype} of shape {features.shape}, expected numbers of shape ({n}, D): "
+            f"one row per training view in capture order"
+        )
+    rows = np.ascontiguousarray(features, dtype=np.float32)
+    lengths = np.sqrt(np.einsum("ij,ij->i", rows, rows, dtype=np.float64))
+    for wrong, what in ((~np.isfinite(lengths), "NaN or infinity"), (lengths == 0, "nothing but zeros")):
+        if wrong.any():
+            i = int(wrong.argmax())
+            raise UserError(f"row {i} of the features (frame '{names[i]}') has {what}; embed that image again")
+    if np.abs(lengths - 1).max() < 1e-6:
+        return rows
+    return (rows / lengths[:, None]).astype(np.float32)
+
+
+def _per_frame(sharpness: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    values = np.asarray(sharpness, dtype=np.float64)
+    if values.shape != (len(names),):
+        raise UserError(f"the sharpness has shape {values.shape}, expected one number for each of {len(names)} frames")
+    wrong = ~(np.isfinite(values) & (values >= 0))
+    if wrong.any():
+        name = names[int(wrong.argmax())]
+        raise UserError(f"the sharpness of frame '{name}' is {values[wrong][0]}, expected a number ≥ 0")
+    return values
+
+
+def _options(selector: str, defaults: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    """The defaults with what was given, each checked against the type of its default."""
+    options = dict(defaults)
+    for name, value in given.items():
+        if name not in defaults:
+            known = f" (it has: {', '.join(defaults)})" if defaults else "; it has none"
+            raise UserError(f"'{selector}' has no parameter '{name}'{nearest(name, defaults)}{known}")
+        options[name] = _checked(f"parameter '{name}' of '{selector}'", value, defaults[name])
+    return options
+
+
+def _checked(what: str, value: Any, default: Any) -> Any:
+    if isinstance(default, bool):
+        fits, expected = isinstance(value, bool), "true or false"
+    elif isinstance(default, float):
+        fits = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        expected = "a number"
+        value = float(value) if fits else value
+    elif isinstance(default, str):
+        fits, expected = isinstance(value, str), "a word"
+    else:
+        value = list(value) if isinstance(value, (list, tuple)) else [value]
+        fits, expected = all(isinstance(item, str) for item in value), "words with commas between them"
+    if not fits:
+        raise UserError(f"{what} is {value!r}, expected {expected}")
+    return value

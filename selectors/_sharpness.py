@@ -25,7 +25,7 @@ class Preference:
         self.allowed = self.sharpness >= np.nanmedian(windows, axis=1)  # (N,) bool
 
     def best(self, gains: np.ndarray) -> int:
-        """Index of the best gain (N,), which is −∞ for views that are gone; ties go to the sharper, then the earlier."""
+        """Index of the best gain (N,), −∞ for views that are gone; ties go to the sharper, then the earlier."""
         if self.sharpness is None:
             return int(gains.argmax())
         scores = gains * self.weights

@@ -1,4 +1,4 @@
-"""The similarity M of views: position, rotation and semantics (Table 1 and Eq. 2 of the paper), never all of it at once.
+"""The similarity M of views by position, rotation and semantics (the paper's Table 1 and Eq. 2), given by columns.
 
     M_ij = α f_d(i, j) + β f_a(i, j) + γ f_p(i, j)
 
@@ -51,7 +51,8 @@ class Similarity:
         """(B, N) rows M_j· for the views j in `chosen`; one pass over the features serves all of them."""
         m = np.stack([self.spatial(j) for j in chosen])
         if self.gamma:
-            assert self.features is not None and self.inverse_norms is not None
+            assert self.features is not None
+            assert self.inverse_norms is not None
             p = self.features[chosen].astype(np.float64) * self.inverse_norms[chosen, None]
             rows = max(1, CHUNK // max(1, p.shape[1]))
             for start in range(0, len(self), rows):
@@ -74,7 +75,8 @@ class Similarity:
         """f_p of the view j with the views `among` (all by default); 0 where the factor is not in use."""
         if not self.gamma:
             return 0.0
-        assert self.features is not None and self.inverse_norms is not None
+        assert self.features is not None
+        assert self.inverse_norms is not None
         p_j = self.features[j].astype(np.float64) * self.inverse_norms[j]
         count = len(self) if among is None else len(among)
         products = np.empty(count)

@@ -1,48 +1,130 @@
-"""The greedy maximiser of log det M_S over the chosen views (the paper's z_DPP)."""
+"""Views whose similarities have the largest determinant: the paper's z_DPP (Section 4.1)."""
+
+import time
 
 import numpy as np
 
-from viewbench.selectors import _similarity
+from viewbench.common.errors import UserError
+from viewbench.selectors import _kdpp
+from viewbench.selectors._cholesky import Residuals
+from viewbench.selectors._nearest import Nearest
+from viewbench.selectors._sharpness import Preference
+from viewbench.selectors._similarity import Similarity, describe, similarity
 from viewbench.selectors._types import Choice, Views
 
 SEEDED = True
 FACTORS = ("pos", "ang", "sem")
-PARAMETERS = {"alpha": 0.7, "beta": 0.2, "sigma": 0.5, "factors": ["pos", "ang", "sem"]}
-PRECISION = 1e-10  # residuals of M's unit diagonal below this are rounding, not geometry
+PARAMETERS = {
+    "alpha": 0.7,
+    "beta": 0.2,
+    "sigma": 0.5,
+    "factors": ["pos", "ang", "sem"],
+    "regularise": 0.0,
+    "sample": False,
+    "sharpness": 0.0,
+}
 
 
-def select(views: Views, count: int, rng: np.random.Generator, **weights: object) -> Choice:
-    """Greedy picks by incremental Cholesky (Chen et al. 2018, "Fast Greedy MAP Inference for DPP"), O(N K²).
+def select(
+    views: Views,
+    count: int,
+    rng: np.random.Generator,
+    alpha: float = 0.7,
+    beta: float = 0.2,
+    sigma: float = 0.5,
+    factors: tuple[str, ...] = FACTORS,
+    regularise: float = 0.0,
+    sample: bool = False,
+    sharpness: float = 0.0,
+) -> Choice:
+    """Greedy maximiser of log det M_S: k* = argmax_k log det M_{S ∪ {k}} − log det M_S, ties to the earlier frame.
 
-    The gain of view k is log d²ₖ with d²ₖ its squared residual against the chosen ones; all are 1 before the first
-    pick, which is therefore drawn. Once the largest residual is below precision the determinant no longer tells
-    views apart: from there on the max-min distance does, and the notes say from which pick.
+    M_kk = 1, so all first picks are equal and the first is drawn at random. The gain of a pick is the logarithm of
+    its residual, computed by an incremental Cholesky factorisation in O(N K²) time and O(N K) memory.
+
+    `regularise` = λ > 0 maximises log det(I + M_S / λ) instead, which is monotone. `sample` draws S from the k-DPP with
+    P(S) ∝ det M_S, as the authors' code does: no greedy order, no gains, and another set for another count.
+
+    Where every residual left is below N ε, the rounding of float64, log det says nothing more about what to choose
+    (the paper's "unsolvable"). From that pick on, `below_precision_from` in the notes counted from 0, the view least
+    similar to those chosen is taken (the rule of `maxmin`), and the gain is reported as the bound log N ε.
+
+    Raises UserError for a negative λ.
     """
-    similar, notes = _similarity.similarity(views, **weights)  # type: ignore[arg-type]
-    n = len(views)
-    factor = np.zeros((count, n))
-    residual = np.ones(n)
-    distance = np.full(n, np.inf)
-    free = np.ones(n, dtype=bool)
-    indices = np.empty(count, dtype=np.int64)
-    gains = np.empty(count)
-    exhausted = None
-    pick = int(rng.integers(n))
-    for rank in range(count):
-        if rank:
-            pick = int(np.argmax(np.where(free, residual, -np.inf)))
-            if exhausted is None and residual[pick] < PRECISION:
-                exhausted = rank
-            if exhausted is not None:
-                pick = int(np.argmax(np.where(free, distance, -np.inf)))
-        indices[rank] = pick
-        gains[rank] = np.log(max(residual[pick], PRECISION)) if exhausted is None else np.log(PRECISION)
-        free[pick] = False
-        row = similar.row(pick)
-        np.minimum(distance, 1 - row, out=distance)
-        if exhausted is None:
-            factor[rank] = (row - factor[:rank, pick] @ factor[:rank]) / np.sqrt(residual[pick])
-            residual = np.maximum(residual - factor[rank] ** 2, 0.0)
-    if exhausted is not None:
-        notes["below_precision_from"] = exhausted
-    return Choice(indices, gains, notes=notes)
+    if not 0 <= regularise < np.inf:
+        raise UserError(f"regularise = {regularise} must be 0 or a positive number; it is λ in log det(I + M / λ)")
+    if sample and regularise:
+        raise UserError("'logdet' either samples or regularises; leave out one of the two")
+    begin = time.perf_counter()
+    similar = similarity(views, alpha, beta, sigma, factors)
+    prepared_s = time.perf_counter() - begin
+    prefer = Preference(views.sharpness, sharpness)
+    precision = len(views) * np.finfo(float).eps * (1 + regularise)
+    if sample:
+        indices, gains = _sample(similar, count, precision, rng), None
+        solved = len(indices)
+    else:
+        indices, gains = _greedy(similar, count, precision, regularise, prefer, rng)
+        solved = len(indices)
+    notes = describe(similar, alpha, beta, factors)
+    if solved < count:
+        notes |= {"below_precision_from": solved, "precision": precision}
+        indices = _fill(similar, indices, count, prefer)
+        gains = None if gains is None else np.append(gains, np.full(count - solved, np.log(precision)))
+    return Choice(indices, gains, {"similarity": prepared_s}, notes)
+
+
+def _kernel(similar: Similarity, regularise: float, capacity: int) -> Residuals:
+    """Residuals of M + λ I; det(I + M_S / λ) is that determinant over λ^|S|."""
+
+    def columns(chosen: np.ndarray) -> np.ndarray:
+        m = similar.columns(chosen)
+        m[np.arange(len(chosen)), chosen] = 1 + regularise
+        return m
+
+    return Residuals(columns, np.full(len(similar), 1 + regularise), capacity)
+
+
+def _greedy(
+    similar: Similarity,
+    count: int,
+    precision: float,
+    regularise: float,
+    prefer: Preference,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The picks and gains down to where residuals are below `precision`."""
+    residuals = _kernel(similar, regularise, count)
+    indices: list[int] = []
+    gains: list[float] = []
+    for k in range(count):
+        pick = prefer.best(residuals.left) if k else prefer.any(rng, len(similar))
+        if residuals.left[pick] <= precision:
+            break
+        indices.append(pick)
+        gains.append(float(np.log(residuals.left[pick] / (regularise or 1))))
+        prefer.take(pick)
+        residuals.add(pick)
+    return np.array(indices, dtype=np.int64), np.array(gains)
+
+
+def _sample(similar: Similarity, count: int, precision: float, rng: np.random.Generator) -> np.ndarray:
+    """A sample of the k-DPP, k lowered to the numerical rank of M where that is less than `count`."""
+    residuals = _kernel(similar, 0.0, len(similar))
+    while residuals.size < len(similar) and residuals.left.max() > precision:
+        residuals.add(int(residuals.left.argmax()))
+    return _kdpp.sample(residuals.rows, min(count, residuals.size), rng)
+
+
+def _fill(similar: Similarity, indices: np.ndarray, count: int, prefer: Preference) -> np.ndarray:
+    """`indices` followed by the views farthest from them, up to `count`."""
+    nearest = Nearest(similar)
+    for i in indices:
+        nearest.add(int(i))
+    result = list(indices)
+    while len(result) < count:
+        pick = prefer.best(nearest.distance)
+        prefer.take(pick)
+        nearest.add(pick)
+        result.append(pick)
+    return np.array(result, dtype=np.int64)

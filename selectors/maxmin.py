@@ -4,8 +4,9 @@ import time
 
 import numpy as np
 
+from viewbench.selectors._nearest import Nearest
 from viewbench.selectors._sharpness import Preference
-from viewbench.selectors._similarity import Similarity, describe, similarity
+from viewbench.selectors._similarity import describe, similarity
 from viewbench.selectors._start import first
 from viewbench.selectors._types import Choice, Views
 
@@ -19,7 +20,6 @@ PARAMETERS = {
     "start": "random",
     "sharpness": 0.0,
 }
-MARGIN = 1e-9  # of the bounds below, far above the rounding of what they bound
 
 
 def select(
@@ -51,51 +51,3 @@ def select(
         prefer.take(pick)
         nearest.add(pick)
     return Choice(chosen, gains, {"similarity": prepared_s}, describe(similar, alpha, beta, factors))
-
-
-class Nearest:
-    """Distance min_{i ∈ S} (1 − M_ik) of every view k to a growing set S; −∞ for the members of S.
-
-    A new member i changes the distance of k only if M_ik > 1 − distance_k. Since f_p is at most 1 and f_a at most
-    A = (max ‖R‖² + 1) / 4 (1, but for rounded rotations), that needs α f_d > 1 − distance_k − β A − γ, a ball around k that shrinks with distance_k: most views are outside and are
-    passed over after three subtractions. Of the rest, the semantic product is computed only where α f_d + β f_a + γ
-    leaves the question open. The result is the same as without these bounds.
-    """
-
-    def __init__(self, similar: Similarity):
-        n = len(similar)
-        self.similar = similar
-        self.distance = np.full(n, np.inf)  # (N,)
-        self.reach = np.full(n, np.inf)  # (N,) squared radius of the ball, in units of σ √2
-        self.turned = similar.beta * (np.einsum("ij,ij->i", similar.turns, similar.turns).max() + 1) / 4  # β A
-        self.axes = np.ascontiguousarray(similar.points.T)  # (3, N)
-
-    def add(self, i: int) -> None:
-        """Adds view i to the set."""
-        m, distance = self.similar, self.distance
-        near = np.flatnonzero(self._squared_distance(i) < self.reach)
-        bound = m.spatial(i, near)
-        if m.gamma:
-            open_ = bound + m.gamma + MARGIN > 1 - distance[near]
-            near, bound = near[open_], bound[open_]
-            bound += m.gamma * m.semantic(i, near)
-        away = 1 - bound
-        nearer = away < distance[near]
-        changed = near[nearer]
-        distance[changed] = away[nearer]
-        distance[i] = -np.inf
-        if m.alpha:
-            needed = (1 - distance[changed] - self.turned - m.gamma) / m.alpha  # of f_d, to come nearer still
-            with np.errstate(divide="ignore"):
-                self.reach[changed] = MARGIN - np.log(np.maximum(needed, 0))
-        self.reach[i] = -np.inf
-
-    def _squared_distance(self, i: int) -> np.ndarray:
-        x, y, z = self.axes
-        total = x - x[i]
-        total *= total
-        for axis in (y, z):
-            step = axis - axis[i]
-            step *= step
-            total += step
-        return total

@@ -32,12 +32,12 @@ class Gsplat:
         device="cuda",
         deterministic=False,  # the CUDA kernels add gradients up in no fixed order
         options={
-            "strategy": "default",  # or "mcmc": 3DGS as Markov chain Monte Carlo, with at most `cap` Gaussians
+            "strategy": "default",  # or "mcmc": 3DGS as Markov chain Monte Carlo
             "points": "scene",  # or "selected", "random": see _seeding.py
             "random_points": 100_000,
             "sh_degree": 3,
             "background": "black",  # or "white", as the paper's authors train
-            "cap": 1_000_000,
+            "cap": 0,  # no growth once there are so many Gaussians; 0: none for "default", 1,000,000 for "mcmc"
         },
     )
 
@@ -101,9 +101,9 @@ def _check(options: dict[str, Any]) -> None:
             raise UserError(f"option '{option}' is '{options[option]}', expected {' or '.join(map(repr, known))}")
     if not 0 <= options["sh_degree"] <= 3:
         raise UserError(f"option 'sh_degree' is {options['sh_degree']}, expected 0 to 3")
-    for option in ("cap", "random_points"):
-        if options[option] < 1:
-            raise UserError(f"option '{option}' is {options[option]}, expected a positive number")
+    for option, least in (("cap", 0), ("random_points", 1)):
+        if options[option] < least:
+            raise UserError(f"option '{option}' is {options[option]}, expected {least} or more")
 
 
 def configured(argument: str, settings: Settings) -> Gsplat:

@@ -1,5 +1,6 @@
 """Fits Gaussians to the chosen views with gsplat's rasteriser and one of its densification strategies."""
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -26,7 +27,9 @@ from viewbench.scenes.types import Cameras
 PAPER_STEPS = 30_000  # the run that the 3DGS authors' schedules are made for; shorter ones are squeezed
 SH_EVERY = 1000  # steps after which one more band of spherical harmonics takes part
 MCMC_REGULARISATION = 0.01  # weight of mean opacity and of mean scale in 3DGS-MCMC
-LEAST_REFINE = 10  # steps between densifications: gradients of fewer views say little
+MCMC_CAP = 1_000_000  # Gaussians, gsplat's default
+# Steps that no run goes below: gradients of fewer views say little, and opacities need time to come back.
+LEAST_REFINE, LEAST_RESET = 10, 300
 NEAR = 0.01  # scene units, gsplat's own default
 CURVE_POINTS = 20
 RESIDENT_SHARE = 0.25  # of the free GPU memory that images may take; above, each is sent when it is used
@@ -84,17 +87,18 @@ class Densification:
         def squeezed(step: int, least: int = 1) -> int:
             return max(least, round(step * steps / PAPER_STEPS))
 
-        self.kind = options["strategy"]
+        self.kind, self.cap = options["strategy"], options["cap"]
         shared = {"refine_start_iter": squeezed(500), "refine_every": squeezed(100, LEAST_REFINE)}
         self.strategy: Any
         if self.kind == "mcmc":
-            self.strategy = MCMCStrategy(cap_max=options["cap"], refine_stop_iter=squeezed(25_000), **shared)
+            self.strategy = MCMCStrategy(cap_max=self.cap or MCMC_CAP, refine_stop_iter=squeezed(25_000), **shared)
             self.state = self.strategy.initialize_state()
         else:
             self.strategy = DefaultStrategy(
-                refine_stop_iter=squeezed(15_000), reset_every=squeezed(3000), verbose=False, **shared
+                refine_stop_iter=squeezed(15_000), reset_every=squeezed(3000, LEAST_RESET), **shared
             )
             self.state = self.strategy.initialize_state(scene_scale=extent)
+            self.growth = self.strategy.grow_grad2d
         self.params, self.optims = params, optims
         self.strategy.check_sanity(params, optims)
 
@@ -107,6 +111,8 @@ class Densification:
             rate = self.optims["means"].param_groups[0]["lr"]
             self.strategy.step_post_backward(self.params, self.optims, self.state, step, info, lr=rate)
             return
+        full = self.cap and len(self.params["means"]) >= self.cap
+        self.strategy.grow_grad2d = math.inf if full else self.growth  # pruning goes on
         self.strategy.step_post_backward(self.params, self.optims, self.state, step, info, packed=False)
         if 0 < step < self.strategy.refine_stop_iter and step % self.strategy.reset_every == 0:
             # gsplat 1.5.3 never gets here by itself: it tests `step % reset_every == 0 & step > 0`, in which `&`
@@ -150,7 +156,7 @@ def fit(
     except torch.OutOfMemoryError:
         raise UserError(
             f"the GPU's memory is full with {len(params['means'])} Gaussians and {len(data.names)} views of "
-            f"{data.cameras.width[0]} pixels width; train at a smaller width, or with strategy=mcmc and a smaller cap"
+            f"{data.cameras.width[0]} pixels width; train at a smaller width, or set a smaller cap on them"
         ) from None
     used = torch.cuda.get_device_name(device) if device.startswith("cuda") else device
     return arrays(params), {

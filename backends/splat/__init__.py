@@ -1,0 +1,57 @@
+"""3D Gaussian splatting on the CPU, one thread: trains from points, writes a model.ply that any splat viewer opens."""
+
+import importlib.util
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
+from viewbench.backends.splat.options import Options, defaults
+from viewbench.common.errors import UserError
+from viewbench.common.files import read_json
+from viewbench.scenes.types import Cameras
+
+CAPABILITIES = Capabilities(device="cpu", default_iterations=3000, options=defaults())
+
+
+def available() -> str | None:
+    """Why it cannot run here, or None."""
+    return None if importlib.util.find_spec("numba") else "pip install numba"
+
+
+def version() -> str:
+    """Of viewbench: the kernels are its own."""
+    from viewbench import __version__
+
+    return f"viewbench {__version__}"
+
+
+def warm() -> None:
+    """Compiles every kernel into numba's cache; a second call takes a fraction of a second."""
+    from viewbench.backends.splat.warm import warm as compile_kernels
+
+    compile_kernels()
+
+
+def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict, report: Report) -> Trained:
+    """Trains on the chosen views and fills `out` with model.ply and what rendering needs beside it."""
+    from viewbench.backends.splat.train import train as run
+
+    return run(data, out, seed, budget, options, report)
+
+
+def render(model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
+    """(H, W, 3) float32 pictures of a trained model. Raises UserError for a model that is missing or broken."""
+    from viewbench.backends.splat import ply
+    from viewbench.backends.splat.train import draw
+
+    settings = read_json(model / "splat.json", "splat settings")
+    try:
+        near, background, degree = float(settings["near"]), float(settings["background"]), int(settings["degree"])
+    except (KeyError, TypeError, ValueError):
+        raise UserError(f"'{model / 'splat.json'}' is not what training wrote; train again") from None
+    return draw(ply.read(model / "model.ply"), cameras, near, background, degree)
+
+
+__all__ = ["CAPABILITIES", "Options", "available", "render", "train", "version", "warm"]

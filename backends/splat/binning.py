@@ -1,0 +1,122 @@
+"""Which splats touch which 8 x 8 tile, each tile's in order of depth.
+
+One radix sort of the visible splats by depth, then each splat is written to the tiles that its ellipse
+{d : dᵀ Q d < cut} touches, row of tiles by row of tiles, found exactly; a counting fill keeps the depth order in each
+tile. Every (splat, tile) pair has a slot of its own for gradients, grouped by splat: no atomics, and the same bytes on
+every run.
+"""
+
+import math
+
+import numpy as np
+
+from viewbench.backends.splat.kernels import HALF, ONE, ZERO, F, compiled
+from viewbench.backends.splat.projection import (
+    CONIC_A,
+    CONIC_B,
+    CONIC_C,
+    CUT,
+    DEPTH,
+    HALF_HEIGHT,
+    X,
+    Y,
+)
+
+TILE = 8  # pixels; 64 of them are a few vectors, and small tiles waste little on small splats
+
+
+@compiled
+def sort_visible(n, extents, order, scratch, keys, scratch_keys):
+    """Writes the indices of visible splats, nearest first, into `order`; returns their number.
+
+    Sorts 22 bits of log depth, 11 at a time: neighbours closer than 3e-6 of the range keep their storage order.
+    """
+    visible = 0
+    nearest, farthest = np.inf, 0.0
+    for i in range(n):
+        if extents[i, CUT] > ZERO:
+            order[visible] = i
+            visible += 1
+            nearest, farthest = min(nearest, extents[i, DEPTH]), max(farthest, extents[i, DEPTH])
+    if visible == 0:
+        return 0
+    low = math.log(nearest)
+    scale = (2**22 - 1) / max(math.log(farthest) - low, 1e-9)
+    first, second = np.zeros(2048, np.int64), np.zeros(2048, np.int64)
+    for j in range(visible):
+        key = np.uint32((math.log(extents[order[j], DEPTH]) - low) * scale)
+        keys[j] = key
+        first[key & 2047] += 1
+        second[key >> 11] += 1
+    start, other = 0, 0
+    for bucket in range(2048):
+        start, first[bucket] = start + first[bucket], start
+        other, second[bucket] = other + second[bucket], other
+    for j in range(visible):
+        bucket = keys[j] & 2047
+        scratch[first[bucket]], scratch_keys[first[bucket]] = order[j], keys[j]
+        first[bucket] += 1
+    for j in range(visible):
+        bucket = scratch_keys[j] >> 11
+        order[second[bucket]] = scratch[j]
+        second[bucket] += 1
+    return visible
+
+
+@compiled
+def fill_tiles(visible, order, splats, extents, width, height, first_slot, slots, slot_tile, slot_splat, lists, starts):
+    """Fills the slots and the tiles' lists of slots; returns the number of pairs, or -1 when they do not fit.
+
+    first_slot, slots: (N,) where a splat's slots begin and how many there are, 0 for those not drawn (set by the
+    caller). slot_tile, slot_splat: (P,). lists: (P,) slots, tile after tile, nearest first; starts: (tiles + 1,).
+    """
+    across, down = (width + TILE - 1) // TILE, (height + TILE - 1) // TILE
+    tiles = across * down
+    counts = np.zeros(tiles + 1, np.int64)
+    pairs = 0
+    capacity = slot_tile.shape[0]
+    size, inverse_size = F(TILE), F(1 / TILE)
+    for j in range(visible):
+        i = order[j]
+        x, y = splats[i, X], splats[i, Y]
+        a, b, c = extents[i, CONIC_A], extents[i, CONIC_B], extents[i, CONIC_C]
+        cut, half_height = extents[i, CUT], extents[i, HALF_HEIGHT]
+        top = max(0, math.floor((y - half_height - HALF) * inverse_size))
+        bottom = min(down - 1, math.floor((y + half_height - HALF) * inverse_size))
+        if pairs + (bottom - top + 1) * across > capacity:
+            return -1
+        begin = pairs
+        # At height d the ellipse spans x - (b/a) d ± sqrt(cut/a - det/a² d²); it is widest to the right at d_right.
+        inverse_a = ONE / a
+        slope, square = b * inverse_a, cut * inverse_a
+        curve = (a * c - b * b) * inverse_a * inverse_a
+        d_right = -b * np.sqrt(cut / (c * (a * c - b * b)))
+        for row in range(top, bottom + 1):
+            low = max(F(row) * size + HALF - y, -half_height)
+            high = min(F(row) * size + size - HALF - y, half_height)
+            if low > high:
+                # The extreme lies between two rows of pixel centres: the row of tiles has none inside.
+                continue
+            at = min(max(d_right, low), high)
+            right = x - slope * at + np.sqrt(max(ZERO, square - curve * at * at))
+            at = min(max(-d_right, low), high)
+            left = x - slope * at - np.sqrt(max(ZERO, square - curve * at * at))
+            first_pixel, last_pixel = math.ceil(left - F(0.501)), math.floor(right - F(0.499))
+            if last_pixel < first_pixel or last_pixel < 0 or first_pixel >= width:
+                continue
+            for column in range(max(first_pixel, 0) // TILE, min(last_pixel, width - 1) // TILE + 1):
+                tile = row * across + column
+                slot_tile[pairs], slot_splat[pairs] = tile, i
+                counts[tile] += 1
+                pairs += 1
+        first_slot[i], slots[i] = begin, pairs - begin
+    total = 0
+    for tile in range(tiles):
+        starts[tile] = total
+        total, counts[tile] = total + counts[tile], total
+    starts[tiles] = total
+    for slot in range(pairs):
+        tile = slot_tile[slot]
+        lists[counts[tile]] = slot
+        counts[tile] += 1
+    return pairs

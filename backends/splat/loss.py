@@ -1,0 +1,167 @@
+"""The training loss of 3DGS, (1 - λ) L1 + λ (1 - SSIM), and its gradient with respect to the picture.
+
+SSIM as Wang et al. 2004: 11 x 11 Gaussian window with σ = 1.5, zero beyond the picture, C₁ = 0.01², C₂ = 0.03². The
+window is separable; images lie in planes padded by 5 zeros on each side, so that both passes are long flat loops.
+With µ, E = blur(x²) and F = blur(xy), SSIM = A₁A₂ / (B₁B₂), A₁ = 2µµ_y + C₁, A₂ = 2(F - µµ_y) + C₂,
+B₁ = µ² + µ_y² + C₁, B₂ = E - µ² + var_y + C₂, and ∂/∂x = blur(∂/∂µ) + 2x blur(∂/∂E) + y blur(∂/∂F).
+"""
+
+import numpy as np
+
+from viewbench.backends.splat.kernels import ONE, TWO, ZERO, F, compiled
+
+RADIUS = 5
+C1, C2 = F(1e-4), F(9e-4)
+_window = np.exp(-(np.arange(-RADIUS, RADIUS + 1) ** 2) / (2 * 1.5**2))
+WINDOW = _window / _window.sum()
+W0, W1, W2, W3, W4, W5 = (F(WINDOW[RADIUS + offset]) for offset in range(6))
+# Unsigned offsets: with signed ones the compiler must allow for wrapping and gives up on vectors.
+U1, U2, U3, U4, U5, U6, U7, U8, U9, U10 = (np.uint64(offset) for offset in range(1, 11))
+
+
+class Planes:
+    """Sizes of the padded planes, and the loss's working memory."""
+
+    def __init__(self, width: int, height: int):
+        self.width, self.height = width, height
+        self.stride = -(-(width + 2 * RADIUS) // 16) * 16
+        self.rows = height + 2 * RADIUS
+        self.size = self.rows * self.stride
+        self.mask = np.zeros(self.size, np.float32)
+        self.view(self.mask)[:] = 1
+        self.work = np.zeros((8, self.size), np.float32)
+
+    def new(self, channels: int = 3) -> np.ndarray:
+        """(channels, size) of zeros."""
+        return np.zeros((channels, self.size), np.float32)
+
+    def view(self, planes: np.ndarray) -> np.ndarray:
+        """The picture inside padded planes, (…, H, W), not a copy."""
+        shaped = planes.reshape(*planes.shape[:-1], self.rows, self.stride)
+        return shaped[..., RADIUS : RADIUS + self.height, RADIUS : RADIUS + self.width]
+
+    def target(self, image: np.ndarray) -> np.ndarray:
+        """(3, 3, size): a training image (H, W, 3), its local mean and its local variance, in padded planes."""
+        from scipy.ndimage import convolve1d
+
+        def blur(plane: np.ndarray) -> np.ndarray:
+            first = convolve1d(plane, WINDOW, axis=0, mode="constant")
+            return convolve1d(first, WINDOW, axis=1, mode="constant")
+
+        planes = np.zeros((3, 3, self.size), np.float32)
+        for channel in range(3):
+            values = image[..., channel].astype(np.float64)
+            mean = blur(values)
+            self.view(planes[0, channel])[:] = values
+            self.view(planes[1, channel])[:] = mean
+            self.view(planes[2, channel])[:] = blur(values * values) - mean * mean
+        return planes
+
+
+@compiled
+def _blur_rows(a, out, n):
+    for i in range(np.uint64(n)):
+        out[i + U5] = (
+            W0 * a[i + U5]
+            + W1 * (a[i + U4] + a[i + U6])
+            + W2 * (a[i + U3] + a[i + U7])
+            + W3 * (a[i + U2] + a[i + U8])
+            + W4 * (a[i + U1] + a[i + U9])
+            + W5 * (a[i] + a[i + U10])
+        )
+
+
+@compiled
+def _blur_columns(a, out, n, stride):
+    s1 = np.uint64(stride)
+    s2, s3, s4, s5 = s1 * U2, s1 * U3, s1 * U4, s1 * U5
+    s6, s7, s8, s9, s10 = s1 * U6, s1 * U7, s1 * U8, s1 * U9, s1 * U10
+    for i in range(np.uint64(n)):
+        out[i + s5] = (
+            W0 * a[i + s5]
+            + W1 * (a[i + s4] + a[i + s6])
+            + W2 * (a[i + s3] + a[i + s7])
+            + W3 * (a[i + s2] + a[i + s8])
+            + W4 * (a[i + s1] + a[i + s9])
+            + W5 * (a[i] + a[i + s10])
+        )
+
+
+@compiled
+def _multiply(a, b, out, n):
+    for i in range(n):
+        out[i] = a[i] * b[i]
+
+
+@compiled
+def _ssim(mean, square, product, mean_y, var_y, mask, d_mean, d_square, d_product, scale, n):
+    """Sum of SSIM over the picture; writes `scale` times its derivatives by µ, E and F."""
+    total = ZERO
+    for i in range(n):
+        m, my, inside = mean[i], mean_y[i], mask[i]
+        a1, a2 = TWO * m * my + C1, TWO * (product[i] - m * my) + C2
+        b1 = ONE / (m * m + my * my + C1)
+        b2 = ONE / (square[i] - m * m + var_y[i] + C2)
+        both = b1 * b2
+        value = a1 * a2 * both
+        total += value * inside
+        by_product = TWO * a1 * both
+        by_square = -value * b2
+        by_mean = TWO * my * a2 * both - TWO * m * value * b1 - my * by_product - TWO * m * by_square
+        factor = scale * inside
+        d_mean[i], d_square[i], d_product[i] = factor * by_mean, factor * TWO * by_square, factor * by_product
+    return total
+
+
+@compiled
+def _gradient(x, y, by_mean, by_square, by_product, out, step, n):
+    """Writes the gradient of the whole loss; returns the sum of |x - y|."""
+    total = ZERO
+    for i in range(n):
+        difference = x[i] - y[i]
+        total += abs(difference)
+        sign = step if difference > ZERO else (-step if difference < ZERO else ZERO)
+        out[i] = by_mean[i] + x[i] * by_square[i] + y[i] * by_product[i] + sign
+    return total
+
+
+@compiled
+def loss(image, target, mask, work, gradient, stride, weight, pixels):
+    """The loss, a float; fills `gradient`. All planes are padded: image, gradient (3, size), target (3, 3, size)."""
+    n = image.shape[1]
+    flat, tall = n - 2 * RADIUS, n - 2 * RADIUS * stride
+    inverse = ONE / F(3 * pixels)
+    step = (ONE - weight) * inverse
+    total = 0.0
+    for c in range(3):
+        x, y = image[c], target[0, c]
+        _multiply(x, x, work[0], n)
+        _multiply(x, y, work[1], n)
+        _blur_rows(x, work[2], flat)
+        _blur_rows(work[0], work[3], flat)
+        _blur_rows(work[1], work[4], flat)
+        _blur_columns(work[2], work[5], tall, stride)
+        _blur_columns(work[3], work[6], tall, stride)
+        _blur_columns(work[4], work[7], tall, stride)
+        similarity = _ssim(
+            work[5],
+            work[6],
+            work[7],
+            target[1, c],
+            target[2, c],
+            mask,
+            work[0],
+            work[1],
+            work[2],
+            -weight * inverse,
+            n,
+        )
+        _blur_rows(work[0], work[3], flat)
+        _blur_rows(work[1], work[4], flat)
+        _blur_rows(work[2], work[5], flat)
+        _blur_columns(work[3], work[0], tall, stride)
+        _blur_columns(work[4], work[1], tall, stride)
+        _blur_columns(work[5], work[2], tall, stride)
+        absolute = _gradient(x, y, work[0], work[1], work[2], gradient[c], step, n)
+        total += weight * inverse * (F(pixels) - similarity) + step * absolute
+    return total

@@ -1,0 +1,165 @@
+"""EWA splatting (Zwicker et al. 2001, as in 3DGS, Eqs. 5 and 6): Gaussians in space to ellipses on the screen.
+
+A Gaussian with mean m and covariance Σ = M Mᵀ, M = R(q) diag(s), seen by a camera with world-to-camera rotation W and
+position t = W m + d, becomes a 2D Gaussian with mean (fx tx/tz + cx, fy ty/tz + cy) and covariance
+Σ' = U Uᵀ + 0.3 I, U = J W M, J the Jacobian of the perspective division at t. J is taken at a point clamped to 1.3
+times the field of view, as in 3DGS, since the linearisation explodes outside it.
+
+The colour is SH₀₀ c₀ + ½ plus the degree-1 terms in the direction from the camera, cut at 0. Directions do not carry
+gradient to the mean, which is what 3DGS's own kernels leave in and what makes no measurable difference here.
+"""
+
+import numpy as np
+
+from viewbench.backends.splat.kernels import HALF, LOG2E, ONE, TWO, ZERO, F, compiled, exp, inlined, sigmoid
+from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0, SH1, SH_C0, SH_C1
+from viewbench.scenes.types import OPENCV, Cameras
+
+BLUR = F(0.3)  # pixels², added to the diagonal of Σ': no splat is thinner than about a pixel
+MARGIN = F(1.3)  # of the half field of view, where J's point is clamped
+MIN_ALPHA_LOG2 = F(7.994353436858858)  # -log2(1/255): below it a splat is not drawn
+C_0, C_1 = F(SH_C0), F(SH_C1)
+
+# A camera as kernels take it: 21 float32.
+ROTATION, TRANSLATION, FX, FY, CX, CY, POSITION, WIDTH, HEIGHT = 0, 9, 12, 13, 14, 15, 16, 19, 20
+
+# Columns of `splats`, what the rasteriser reads of each Gaussian. With d = pixel - mean, log2 of alpha is
+# L - (A dx² + B dx dy + C dy²): the conic with ½ and log2 e folded in.
+X, Y, A, B, C, LOG2_OPACITY, RED, GREEN, BLUE = range(9)
+SPLAT_COLUMNS = 16  # padded to a cache line
+# Columns of `extents`, what binning reads: conic, squared radius at which alpha is 1/255, half box, depth.
+CONIC_A, CONIC_B, CONIC_C, CUT, HALF_WIDTH, HALF_HEIGHT, DEPTH = range(7)
+EXTENT_COLUMNS = 8
+
+
+def camera_vectors(cameras: Cameras) -> np.ndarray:
+    """(N, 21) float32 camera records."""
+    w2c = np.linalg.inv(cameras.c2w @ OPENCV)
+    intrinsics = np.stack([cameras.fx, cameras.fy, cameras.cx, cameras.cy], axis=1)
+    sizes = np.stack([cameras.width, cameras.height], axis=1)
+    parts = [w2c[:, :3, :3].reshape(-1, 9), w2c[:, :3, 3], intrinsics, cameras.positions, sizes]
+    return np.concatenate(parts, axis=1).astype(np.float32)
+
+
+@inlined
+def to_camera(g, cam, i):
+    """t = W m + d."""
+    x, y, z = g[MEAN, i], g[MEAN + 1, i], g[MEAN + 2, i]
+    tx = cam[0] * x + cam[1] * y + cam[2] * z + cam[9]
+    ty = cam[3] * x + cam[4] * y + cam[5] * z + cam[10]
+    tz = cam[6] * x + cam[7] * y + cam[8] * z + cam[11]
+    return tx, ty, tz
+
+
+@inlined
+def unit_quaternion(g, i):
+    """(w, x, y, z) of length 1, and 1 / length."""
+    w, x, y, z = g[QUATERNION, i], g[QUATERNION + 1, i], g[QUATERNION + 2, i], g[QUATERNION + 3, i]
+    inverse = ONE / np.sqrt(w * w + x * x + y * y + z * z + F(1e-20))
+    return w * inverse, x * inverse, y * inverse, z * inverse, inverse
+
+
+@inlined
+def shape(w, x, y, z, s0, s1, s2):
+    """M = R(q) diag(s), row by row."""
+    return (
+        (ONE - TWO * (y * y + z * z)) * s0,
+        TWO * (x * y - w * z) * s1,
+        TWO * (x * z + w * y) * s2,
+        TWO * (x * y + w * z) * s0,
+        (ONE - TWO * (x * x + z * z)) * s1,
+        TWO * (y * z - w * x) * s2,
+        TWO * (x * z - w * y) * s0,
+        TWO * (y * z + w * x) * s1,
+        (ONE - TWO * (x * x + y * y)) * s2,
+    )
+
+
+@inlined
+def clamped(ratio, limit):
+    """tx/tz (or ty/tz) where J is taken."""
+    return min(max(ratio, -limit), limit)
+
+
+@inlined
+def jacobian_rows(cam, rz, u, v):
+    """T = J W, its two rows."""
+    j0, j1 = cam[FX] * rz, cam[FY] * rz
+    j2, j3 = -j0 * u, -j1 * v
+    return (
+        j0 * cam[0] + j2 * cam[6],
+        j0 * cam[1] + j2 * cam[7],
+        j0 * cam[2] + j2 * cam[8],
+        j1 * cam[3] + j3 * cam[6],
+        j1 * cam[4] + j3 * cam[7],
+        j1 * cam[5] + j3 * cam[8],
+    )
+
+
+@inlined
+def view_direction(g, cam, i):
+    """Unit vector from the camera to the Gaussian."""
+    dx = g[MEAN, i] - cam[POSITION]
+    dy = g[MEAN + 1, i] - cam[POSITION + 1]
+    dz = g[MEAN + 2, i] - cam[POSITION + 2]
+    inverse = ONE / np.sqrt(dx * dx + dy * dy + dz * dz + F(1e-20))
+    return dx * inverse, dy * inverse, dz * inverse
+
+
+@inlined
+def colour(g, i, channel, degree, dx, dy, dz):
+    """Of one channel, before it is cut at 0."""
+    value = C_0 * g[SH0 + channel, i] + HALF
+    if degree > 0:
+        first = -dy * g[SH1 + channel, i] + dz * g[SH1 + 3 + channel, i] - dx * g[SH1 + 6 + channel, i]
+        value += C_1 * first
+    return value
+
+
+@compiled
+def project(g, n, cam, degree, near, splats, extents):
+    """Fills `splats` and `extents` for the first n Gaussians; what is not on the screen gets CUT < 0."""
+    fx, fy, cx, cy, width, height = cam[FX], cam[FY], cam[CX], cam[CY], cam[WIDTH], cam[HEIGHT]
+    limit_x, limit_y = HALF * MARGIN * width / fx, HALF * MARGIN * height / fy
+    for i in range(n):
+        extents[i, CUT] = F(-1)
+        tx, ty, tz = to_camera(g, cam, i)
+        if not tz > near:
+            continue
+        opacity = sigmoid(g[LOGIT, i])
+        log2_opacity = np.log2(opacity)
+        cut = TWO * (log2_opacity + MIN_ALPHA_LOG2) / LOG2E
+        if not cut > ZERO:
+            continue
+        rz = ONE / tz
+        w, x, y, z, _ = unit_quaternion(g, i)
+        s0, s1, s2 = exp(g[LOG_SCALE, i]), exp(g[LOG_SCALE + 1, i]), exp(g[LOG_SCALE + 2, i])
+        m = shape(w, x, y, z, s0, s1, s2)
+        t = jacobian_rows(cam, rz, clamped(tx * rz, limit_x), clamped(ty * rz, limit_y))
+        u0 = t[0] * m[0] + t[1] * m[3] + t[2] * m[6]
+        u1 = t[0] * m[1] + t[1] * m[4] + t[2] * m[7]
+        u2 = t[0] * m[2] + t[1] * m[5] + t[2] * m[8]
+        u3 = t[3] * m[0] + t[4] * m[3] + t[5] * m[6]
+        u4 = t[3] * m[1] + t[4] * m[4] + t[5] * m[7]
+        u5 = t[3] * m[2] + t[4] * m[5] + t[5] * m[8]
+        a = u0 * u0 + u1 * u1 + u2 * u2 + BLUR
+        b = u0 * u3 + u1 * u4 + u2 * u5
+        c = u3 * u3 + u4 * u4 + u5 * u5 + BLUR
+        determinant = a * c - b * b
+        px, py = fx * tx * rz + cx, fy * ty * rz + cy
+        rx, ry = np.sqrt(cut * a), np.sqrt(cut * c)
+        if not determinant > F(1e-12):
+            continue
+        if px + rx <= HALF or px - rx >= width - HALF or py + ry <= HALF or py - ry >= height - HALF:
+            continue
+        inverse = ONE / determinant
+        conic_a, conic_b, conic_c = c * inverse, -b * inverse, a * inverse
+        extents[i, CONIC_A], extents[i, CONIC_B], extents[i, CONIC_C] = conic_a, conic_b, conic_c
+        extents[i, CUT], extents[i, HALF_WIDTH], extents[i, HALF_HEIGHT] = cut, rx, ry
+        extents[i, DEPTH] = tz
+        dx, dy, dz = view_direction(g, cam, i)
+        splats[i, X], splats[i, Y] = px, py
+        splats[i, A], splats[i, B], splats[i, C] = conic_a * (HALF * LOG2E), conic_b * LOG2E, conic_c * (HALF * LOG2E)
+        splats[i, LOG2_OPACITY] = log2_opacity
+        for channel in range(3):
+            splats[i, RED + channel] = max(colour(g, i, channel, degree, dx, dy, dz), ZERO)

@@ -1,0 +1,23 @@
+"""Compiles the kernels once, so that the jobs of a study load them from numba's cache."""
+
+import numpy as np
+
+from viewbench.backends.splat import layout
+from viewbench.backends.splat.engine import Engine
+from viewbench.backends.splat.projection import camera_vectors
+from viewbench.scenes.types import Cameras
+
+
+def warm() -> None:
+    """One step of training on one Gaussian: calls every kernel with the types that training calls them with."""
+    one = np.ones(1)
+    size = np.full(1, 16, np.int64)
+    cameras = Cameras(np.eye(4)[None], 16 * one, 16 * one, 8 * one, 8 * one, size, size)
+    engine = Engine(4, 16, 16, 0.01)
+    gaussians = layout.empty(4)
+    gaussians[layout.MEAN + 2] = -2
+    gaussians[layout.LOGIT] = 1
+    target = engine.planes.target(np.zeros((16, 16, 3), np.float32))
+    rates = np.full(layout.ROWS, 1e-3, np.float32)
+    moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
+    engine.step(gaussians, moments, camera_vectors(cameras)[0], target, 1, rates, 1, 0.2, 1e-3, 1e-3)
