@@ -1,4 +1,8 @@
-"""Image features of a split, computed once for each picture and kept by the picture's content."""
+"""Image features of a split, computed once for each picture and kept by the picture's content.
+
+An encoder is a module of `scenes/encoders`: `available()` says why it cannot be used or None, `version(argument)` says
+what its features depend on besides the pictures, `encoder(argument, device)` loads it.
+"""
 
 import hashlib
 from collections.abc import Callable
@@ -13,19 +17,24 @@ from viewbench.common.files import sha256_file, whole
 from viewbench.scenes.types import Split
 
 ENCODERS = "scenes.encoders"
+DECODING = "squeezed to a square, bicubic"  # part of what the cache is named by
+
+Progress = Callable[[int, int | None, str], None]
+
+
+def silent(done: int, total: int | None, text: str) -> None:
+    """Shows no progress."""
 
 
 def features(
-    split: Split,
-    encoder: str,
-    cache: Path,
-    batch: int = 16,
-    progress: Callable[[int, int | None, str], None] = lambda done, total, text: None,
+    split: Split, encoder: str, cache: Path, batch: int = 16, progress: Progress = silent, device: str = "cpu"
 ) -> np.ndarray:
     """(N, D) float32 rows of length 1, one per frame in capture order.
 
     `encoder` is NAME or NAME:ARGUMENT. Every picture's row is a file in `cache`, named by the hash of the picture's
-    bytes and of the encoder, so that a run that was killed goes on and two captures share pictures.
+    bytes, in a folder named by the encoder's version: a run that was killed goes on where it was, captures share
+    pictures, and a picture that changed is embedded again. `device` is torch's, or "auto".
+
     Raises UserError for an unknown or unavailable encoder and for a picture that cannot be read.
     """
     name, _, argument = encoder.partition(":")
@@ -35,53 +44,91 @@ def features(
     reason = module.available()
     if reason:
         raise UserError(f"encoder '{encoder}' is not available: {reason}")
-    folder = cache / hashlib.sha256(encoder.encode()).hexdigest()[:16]
-    files = [folder / f"{_hash(path)}.npy" for path in split.paths]
-    missing = [i for i, file in enumerate(files) if not file.is_file()]
+    made_by = f"{name}: {module.version(argument)}; {DECODING}"
+    folder = Path(cache) / f"{name}-{hashlib.sha256(made_by.encode()).hexdigest()[:16]}"
+    files = [folder / f"{content_hash(path)}.npy" for path in split.paths]
+    rows = [cached(file) for file in files]
+    missing = [i for i, row in enumerate(rows) if row is None]
     if missing:
-        size, _, encode = module.encoder(argument)
+        size, encode = module.encoder(argument, _device(device))
         for start in range(0, len(missing), batch):
             part = missing[start : start + batch]
-            rows = encode(np.stack([_picture(split.paths[i], size) for i in part]))
-            for i, row in zip(part, rows, strict=True):
-                save(files[i], row / np.linalg.norm(row))
+            pictures = np.stack([picture(split.paths[i], size) for i in part])
+            for i, row in zip(part, encode(pictures), strict=True):
+                rows[i] = row = (row / np.linalg.norm(row)).astype(np.float32)
+                save(files[i], row)
             progress(len(split) - len(missing) + start + len(part), len(split), "")
-    return np.stack([np.load(file, allow_pickle=False) for file in files]).astype(np.float32)
+    return np.stack([row for row in rows if row is not None])
 
 
 def save(path: Path, array: np.ndarray) -> None:
-    """Writes an array as .npy, whole or not at all."""
+    """Writes an array as float32 .npy, whole or not at all."""
     with whole(path) as temporary:
         np.save(temporary, array.astype(np.float32))
 
 
 def load_user_features(path: Path, n: int) -> np.ndarray:
-    """(N, D) features from a .npy file. Raises UserError for a file that is none, or has another number of rows."""
+    """(N, D) float32 features from a .npy file.
+
+    Raises UserError for a file that is none, has another number of rows than `n`, or NaN in some row.
+    """
     try:
         array: Any = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise UserError(f"features '{path}' cannot be read as .npy: {error}") from None
-    if getattr(array, "ndim", 0) != 2 or not np.issubdtype(array.dtype, np.number) or len(array) != n:
-        shape = getattr(array, "shape", "no array")
-        raise UserError(f"features '{path}' are {shape}, expected numbers with one row for each of {n} training views")
+    except OSError as error:
+        raise UserError(f"features '{path}' cannot be read: {error.strerror or error}") from None
+    except (ValueError, EOFError):
+        raise UserError(f"features '{path}' are not a .npy file of numbers; write them with numpy.save") from None
+    if getattr(array, "ndim", 0) != 2 or array.dtype.kind not in "fiu" or len(array) != n:
+        found = f"{array.dtype} of shape {array.shape}" if isinstance(array, np.ndarray) else "several arrays"
+        raise UserError(f"features '{path}' are {found}, expected numbers with one row for each of {n} training views")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        raise UserError(f"features '{path}' have NaN or infinity in row {bad[0]}; embed that image again")
     return array.astype(np.float32)
 
 
-def _hash(path: Path) -> str:
+def content_hash(path: Path) -> str:
+    """Hex SHA-256 of an image file. Raises UserError when it cannot be read."""
     try:
         return sha256_file(path)
     except OSError as error:
         raise UserError(f"image '{path}' cannot be read: {error.strerror}") from None
 
 
-def _picture(path: Path, size: int) -> np.ndarray:
-    """(size, size, 3) float32 in [0, 1]: the whole picture, squeezed to a square as SigLIP's preprocessing does."""
+def picture(path: Path, size: int) -> np.ndarray:
+    """(size, size, 3) float32 in [0, 1]: the whole picture, squeezed to a square as SigLIP's preprocessing does.
+
+    Alpha is laid on white, as for training. Raises UserError for a missing or broken file.
+    """
     from PIL import Image
 
     try:
         with Image.open(path) as image:
             image.draft("RGB", (2 * size, 2 * size))  # JPEG decodes at a fraction of its size where that is enough
-            small = image.convert("RGB").resize((size, size), Image.Resampling.BICUBIC, reducing_gap=3.0)
+            if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+                white = Image.new("RGBA", image.size, "white")
+                flat = Image.alpha_composite(white, image.convert("RGBA")).convert("RGB")
+            else:
+                flat = image.convert("RGB")
+            small = flat.resize((size, size), Image.Resampling.BICUBIC, reducing_gap=3.0)
             return np.asarray(small, dtype=np.float32) / 255
-    except (OSError, SyntaxError) as error:
+    except FileNotFoundError:
+        raise UserError(f"image '{path}' is missing") from None
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
         raise UserError(f"image '{path}' cannot be read: {error}") from None
+
+
+def cached(file: Path) -> np.ndarray | None:
+    """The row in the cache, or None where there is none or it is damaged."""
+    try:
+        return np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError):
+        return None
+
+
+def _device(device: str) -> str:
+    if device != "auto":
+        return device
+    import torch
+
+    return "cuda" if torch.cuda.is_available() else "cpu"

@@ -29,14 +29,14 @@ def version() -> str:
 
 def warm() -> None:
     """Compiles every kernel into numba's cache; a second call takes a fraction of a second."""
-    from viewbench.backends.splat.warm import warm as compile_kernels
+    from viewbench.backends.splat.warmup import compile_kernels
 
     compile_kernels()
 
 
 def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict, report: Report) -> Trained:
     """Trains on the chosen views and fills `out` with model.ply and what rendering needs beside it."""
-    from viewbench.backends.splat.train import train as run
+    from viewbench.backends.splat.loop import train as run
 
     return run(data, out, seed, budget, options, report)
 
@@ -44,7 +44,7 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
 def render(model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
     """(H, W, 3) float32 pictures of a trained model. Raises UserError for a model that is missing or broken."""
     from viewbench.backends.splat import ply
-    from viewbench.backends.splat.train import draw
+    from viewbench.backends.splat.loop import draw
 
     settings = read_json(model / "splat.json", "splat settings")
     try:

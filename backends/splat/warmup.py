@@ -8,7 +8,7 @@ from viewbench.backends.splat.projection import camera_vectors
 from viewbench.scenes.types import Cameras
 
 
-def warm() -> None:
+def compile_kernels() -> None:
     """One step of training on one Gaussian: calls every kernel with the types that training calls them with."""
     one = np.ones(1)
     size = np.full(1, 16, np.int64)

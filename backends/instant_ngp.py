@@ -1,0 +1,158 @@
+"""Instant-ngp, the hash-grid radiance field, run from a checkout of its own that environment.toml names."""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewbench.backends import _ngp_driver, _process, _subset
+from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
+from viewbench.common.errors import UserError
+from viewbench.common.files import read_json, sha256_file, write_json
+from viewbench.common.settings import Settings
+from viewbench.scenes.types import Cameras
+
+SNAPSHOT = "model.ingp"
+RECORD = "model.json"
+LOG = "instant_ngp.log"
+SCALE = 0.33  # instant-ngp multiplies positions by it and adds 0.5, so that the unit cube is 3 scene units wide
+LARGEST_AABB = 128
+CHECK_SECONDS = 60.0
+BUILD = (
+    "clone https://github.com/NVlabs/instant-ngp with --recursive, build it (cmake . -B build && cmake --build build) "
+    "and set [instant_ngp] path in environment.toml to the checkout"
+)
+
+
+@dataclass(frozen=True)
+class InstantNgp:
+    """The backend on one checkout."""
+
+    checkout: str
+    python: str
+
+    CAPABILITIES = Capabilities(
+        device="cuda",
+        deterministic=False,  # its CUDA kernels add up in no fixed order
+        options={
+            "aabb_scale": 4,  # side of the box in units of 1 / 0.33 scene units; the paper takes 16 for Replica
+            "near_distance": -1.0,  # where rays start, in its own units; negative leaves its default
+            "samples": 8,  # per pixel of a render
+        },
+    )
+
+    def available(self) -> str | None:
+        if not self.checkout:
+            return f"no checkout is configured; {BUILD}"
+        folder = Path(self.checkout).expanduser()
+        if not folder.is_dir():
+            return f"[instant_ngp] path '{folder}' is not there; {BUILD}"
+        if not any(folder.glob(_ngp_driver.PYNGP)):
+            return f"'{folder}' has no build/pyngp; build it with its Python bindings (cmake --build build)"
+        if shutil.which(self.python) is None:
+            return f"[instant_ngp] python '{self.python}' is not there; set it to the Python that pyngp was built for"
+        try:
+            with tempfile.TemporaryDirectory(prefix="viewbench-") as place:
+                self._drive("check", Path(place), Path(place) / LOG, timeout_s=CHECK_SECONDS)
+        except UserError as error:
+            return f"its module pyngp cannot be used ({error}); build it again for [instant_ngp] python '{self.python}'"
+        return None
+
+    def version(self) -> str:
+        """The checkout's commit; a hash of the module where it is no git checkout."""
+        folder = Path(self.checkout).expanduser()
+        command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=CHECK_SECONDS, check=True)
+            return f"instant-ngp {done.stdout.strip()}"
+        except (OSError, subprocess.SubprocessError):
+            module = next(iter(sorted(folder.glob(_ngp_driver.PYNGP))))
+            return f"instant-ngp sha256:{sha256_file(module)[:12]}"
+
+    def train(
+        self, data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict[str, Any], report: Report
+    ) -> Trained:
+        """Writes the chosen views as transforms.json, trains, and keeps the snapshot of the network.
+
+        Its own seed is fixed and not within reach of Python; which rays it draws depends on the order of the frames,
+        so that is what the seed shuffles. Raises UserError for a box that it does not know or that cameras are outside
+        of, and, with its last line, when it fails.
+        """
+        _check(data, options)
+        order = np.random.default_rng(seed).permutation(len(data.names))
+        scene = out / "scene"
+        extra = {"aabb_scale": options["aabb_scale"]}
+        _subset.write(scene, "transforms", data.cameras[order], data.images[order], extra=extra)
+        report.progress(0, budget.iterations, f"running instant-ngp, which writes {LOG}")
+        self._drive(
+            "train",
+            out,
+            out / LOG,
+            **{"scene": scene / "transforms.json", "snapshot": out / SNAPSHOT, "record": out / RECORD},
+            **{"steps": budget.iterations or 0, "seconds": budget.seconds or 0.0, "near": options["near_distance"]},
+        )
+        shutil.rmtree(scene)
+        record = read_json(out / RECORD, "instant-ngp's record")
+        write_json(out / RECORD, {**record, "samples": options["samples"], "near": options["near_distance"]})
+        return Trained(
+            iterations=record["iterations"],
+            seconds=record["seconds"],
+            seeding={"points": "none", "count": 0},
+            curve=[{**point, "test_psnr_db": None} for point in record["curve"]],
+            device="cuda",
+        )
+
+    def render(self, model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
+        """Has it render all cameras, then yields them one by one."""
+        record = read_json(model / RECORD, "instant-ngp's record")
+        with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
+            place = Path(folder)
+            write_json(place / "cameras.json", _subset.transforms(cameras))
+            self._drive(
+                "render",
+                place,
+                place / LOG,
+                **{"snapshot": (model / SNAPSHOT).resolve(), "cameras": place / "cameras.json", "images": place},
+                **{"samples": record["samples"], "near": record["near"]},
+            )
+            for index in range(len(cameras)):
+                image = np.load(place / Path(_subset.image_name(index)).with_suffix(".npy"), allow_pickle=False)
+                yield np.clip(image, 0, 1)
+
+    def _drive(
+        self, action: str, folder: Path, log: Path, timeout_s: float | None = None, **arguments: Path | float
+    ) -> None:
+        command = [self.python, str(Path(_ngp_driver.__file__).resolve()), action]
+        command.append(str(Path(self.checkout).expanduser().resolve()))
+        for name, value in arguments.items():
+            command += [f"--{name}", str(value.resolve() if isinstance(value, Path) else value)]
+        _process.run(command, folder, log, f"instant-ngp ({action})", timeout_s)
+
+
+def _check(data: TrainingSet, options: dict[str, Any]) -> None:
+    side = options["aabb_scale"]
+    if not 1 <= side <= LARGEST_AABB or side & (side - 1):
+        raise UserError(f"option 'aabb_scale' is {side}, expected a power of two up to {LARGEST_AABB}")
+    if options["samples"] < 1:
+        raise UserError(f"option 'samples' is {options['samples']}, expected a positive number")
+    reach = side / 2 / SCALE
+    far = np.abs(data.cameras.positions).max(axis=1)
+    if far.max() > reach:
+        name = data.names[int(far.argmax())]
+        raise UserError(
+            f"camera '{name}' is {far.max():.1f} scene units from the origin, instant-ngp's box with aabb_scale={side} "
+            f"ends at {reach:.1f}; set a larger aabb_scale"
+        )
+
+
+def configured(argument: str, settings: Settings) -> InstantNgp:
+    """The backend on the checkout that environment.toml names."""
+    if argument:
+        raise UserError(f"backend 'instant-ngp' takes no name behind a colon, got '{argument}'")
+    return InstantNgp(settings.instant_ngp.path, settings.instant_ngp.python or sys.executable)

@@ -1,0 +1,79 @@
+"""The slow, obvious version: every Gaussian against every pixel in float64 torch, with automatic gradients."""
+
+import numpy as np
+import torch
+
+from viewbench.backends.splat import layout
+
+
+def render(gaussians: torch.Tensor, camera: np.ndarray, degree: int, near: float, background: float) -> torch.Tensor:
+    """(3, H, W) picture of (ROWS, N) float64 parameters for a 21-vector camera, blended exactly."""
+    cam = torch.tensor(camera, dtype=torch.float64)
+    rotation, translation, position = cam[:9].view(3, 3), cam[9:12], cam[16:19]
+    fx, fy, cx, cy = cam[12:16]
+    width, height = int(cam[19]), int(cam[20])
+    mean = gaussians[layout.MEAN : layout.MEAN + 3].T
+    quaternion = gaussians[layout.QUATERNION : layout.QUATERNION + 4].T
+    w, x, y, z = (quaternion / quaternion.norm(dim=1, keepdim=True)).unbind(1)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    turn = torch.stack([torch.stack(row, dim=1) for row in rows], dim=1)
+    scale = gaussians[layout.LOG_SCALE : layout.LOG_SCALE + 3].T.exp()
+    covariance = turn @ torch.diag_embed(scale**2) @ turn.transpose(1, 2)
+
+    t = mean @ rotation.T + translation
+    depth = torch.where(t[:, 2] > near, t[:, 2], torch.ones_like(t[:, 2]))
+    limit_x, limit_y = 1.3 * width / (2 * fx), 1.3 * height / (2 * fy)
+    u, v = (t[:, 0] / depth).clamp(-limit_x, limit_x), (t[:, 1] / depth).clamp(-limit_y, limit_y)
+    zero = torch.zeros_like(depth)
+    jacobian = torch.stack(
+        [torch.stack([fx / depth, zero, -fx * u / depth], 1), torch.stack([zero, fy / depth, -fy * v / depth], 1)], 1
+    )
+    project = jacobian @ rotation
+    flat = project @ covariance @ project.transpose(1, 2) + 0.3 * torch.eye(2, dtype=torch.float64)
+    centre = torch.stack([fx * t[:, 0] / depth + cx, fy * t[:, 1] / depth + cy], 1)
+
+    direction = (mean - position).detach()
+    direction = direction / direction.norm(dim=1, keepdim=True)
+    colour = layout.SH_C0 * gaussians[layout.SH0 : layout.SH0 + 3].T + 0.5
+    if degree:
+        first = gaussians[layout.SH1 :].T.view(-1, 3, 3)  # coefficient, channel
+        basis = torch.stack([-direction[:, 1], direction[:, 2], -direction[:, 0]], 1)
+        colour = colour + layout.SH_C1 * torch.einsum("nk,nkc->nc", basis, first)
+    colour = colour.clamp(min=0)
+
+    order = torch.argsort(t[:, 2].detach())
+    order = order[t[order, 2] > near]
+    rows_, columns = torch.meshgrid(
+        torch.arange(height, dtype=torch.float64) + 0.5, torch.arange(width, dtype=torch.float64) + 0.5, indexing="ij"
+    )
+    pixel = torch.stack([columns.reshape(-1), rows_.reshape(-1)], 1)
+    d = pixel[:, None] - centre[order][None]
+    power = 0.5 * torch.einsum("pni,nij,pnj->pn", d, torch.linalg.inv(flat[order]), d)
+    alpha = torch.sigmoid(gaussians[layout.LOGIT, order])[None] * torch.exp(-power)
+    alpha = torch.where(alpha < 1 / 255, torch.zeros_like(alpha), alpha.clamp(max=0.99))
+    left = torch.cumprod(torch.cat([torch.ones(len(pixel), 1, dtype=torch.float64), 1 - alpha], 1), 1)
+    picture = (alpha * left[:, :-1]) @ colour[order] + left[:, -1:] * background
+    return picture.T.reshape(3, height, width)
+
+
+def ssim(x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+    """Mean SSIM of (3, H, W), zero padding."""
+    window = torch.exp(-(torch.arange(-5, 6, dtype=torch.float64) ** 2) / (2 * 1.5**2))
+    window = window / window.sum()
+    kernel = torch.outer(window, window).expand(3, 1, 11, 11)
+
+    def blur(a):
+        return torch.nn.functional.conv2d(a[None], kernel, padding=5, groups=3)[0]
+
+    mx, my = blur(x), blur(y)
+    vx, vy, cov = blur(x * x) - mx * mx, blur(y * y) - my * my, blur(x * y) - mx * my
+    return ((2 * mx * my + 1e-4) * (2 * cov + 9e-4) / ((mx**2 + my**2 + 1e-4) * (vx + vy + 9e-4))).mean()
+
+
+def loss(x: torch.Tensor, y: torch.Tensor, weight: float) -> torch.Tensor:
+    """(1 - weight) L1 + weight (1 - SSIM)."""
+    return (1 - weight) * (x - y).abs().mean() + weight * (1 - ssim(x, y))
