@@ -12,8 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-BLOCK = 32  # columns asked for together: those of the leading residuals, which are likely to be wanted next
-KEPT = 8 * BLOCK  # columns kept at hand
+from viewbench.selectors._columns import BLOCK, Columns
 
 
 class Residuals:
@@ -22,9 +21,8 @@ class Residuals:
     def __init__(self, columns: Callable[[np.ndarray], np.ndarray], diagonal: np.ndarray, capacity: int):
         self.left = diagonal.copy()  # (N,) r_k ≥ 0; −∞ for the members of S
         self.size = 0
-        self._columns = columns
+        self._columns = Columns(columns, len(diagonal))
         self._rows = np.empty((capacity, len(diagonal)))  # V
-        self._at_hand: dict[int, np.ndarray] = {}
 
     @property
     def rows(self) -> np.ndarray:
@@ -41,10 +39,7 @@ class Residuals:
         self.left[gone] = self.left[j] = -np.inf
 
     def _column(self, j: int) -> np.ndarray:
-        if j not in self._at_hand:
+        if j not in self._columns:  # made together with those of the leading residuals, likely to be wanted next
             likely = np.argpartition(self.left, -min(BLOCK, len(self.left)))[-BLOCK:]
-            wanted = [j, *(int(i) for i in likely if i != j and i not in self._at_hand)]
-            while len(self._at_hand) + len(wanted) > KEPT:
-                del self._at_hand[next(iter(self._at_hand))]
-            self._at_hand |= zip(wanted, self._columns(np.array(wanted)), strict=True)
-        return self._at_hand.pop(j)
+            self._columns.fetch([j, *likely])
+        return self._columns[j]

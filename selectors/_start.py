@@ -3,11 +3,11 @@
 import numpy as np
 
 from viewbench.common.errors import UserError, nearest
+from viewbench.selectors._columns import BLOCK
 from viewbench.selectors._sharpness import Preference
 from viewbench.selectors._similarity import Similarity
 
 STARTS = ("random", "medoid")
-BLOCK = 32  # columns of M at a time
 
 
 def first(start: str, similar: Similarity, prefer: Preference, rng: np.random.Generator) -> int:

@@ -8,9 +8,9 @@ import time
 
 import numpy as np
 
+from viewbench.selectors._columns import BLOCK, Columns
 from viewbench.selectors._sharpness import Preference
 from viewbench.selectors._similarity import describe, similarity
-from viewbench.selectors._start import BLOCK
 from viewbench.selectors._types import Choice, Views
 
 SEEDED = False
@@ -37,11 +37,12 @@ def select(
     similar = similarity(views, alpha, beta, sigma, factors)
     prefer = Preference(views.sharpness, sharpness)
     n = len(views)
+    columns = Columns(similar.columns, n)
     served = np.zeros(n)  # max_{j ∈ S} M_ij of every view i
     bounds = np.full(n, np.inf)  # gain of every view when it was last computed; −∞ once chosen
     everyone = np.arange(n)
     for block in np.split(everyone, everyone[BLOCK::BLOCK]):
-        bounds[block] = _gains(similar.columns(block), served)
+        bounds[block] = np.maximum(similar.columns(block), 0).sum(axis=1)
     prepared_s = time.perf_counter() - begin
     chosen = np.empty(count, dtype=np.int64)
     gains = np.empty(count)
@@ -52,15 +53,13 @@ def select(
             stale[pick] = np.inf  # whatever else is computed again, the leader is
             block = np.argpartition(stale, -min(BLOCK, n))[-min(BLOCK, n) :]
             block = block[stale[block] > -np.inf]
-            bounds[block] = _gains(similar.columns(block), served)
-            fresh[block] = True
+            columns.fetch([pick, *block])
+            for j in block:
+                if j in columns:
+                    bounds[j] = np.maximum(columns[j] - served, 0).sum()
+                    fresh[j] = True
         chosen[k], gains[k] = pick, bounds[pick]
-        np.maximum(served, similar.column(pick), out=served)
+        np.maximum(served, columns[pick], out=served)
         bounds[pick] = -np.inf
         prefer.take(pick)
     return Choice(chosen, gains, {"similarity": prepared_s}, describe(similar, alpha, beta, factors))
-
-
-def _gains(columns: np.ndarray, served: np.ndarray) -> np.ndarray:
-    """(B,) f(S ∪ {j}) − f(S) from the columns (B, N) of M."""
-    return np.maximum(columns - served, 0).sum(axis=1)

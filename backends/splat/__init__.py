@@ -12,7 +12,7 @@ from viewbench.common.errors import UserError
 from viewbench.common.files import read_json
 from viewbench.scenes.types import Cameras
 
-CAPABILITIES = Capabilities(device="cpu", default_iterations=3000, options=defaults())
+CAPABILITIES = Capabilities(device="cpu", resumes=True, default_iterations=3000, options=defaults())
 
 
 def available() -> str | None:

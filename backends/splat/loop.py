@@ -13,100 +13,115 @@ from viewbench.backends.splat.options import Options
 from viewbench.backends.splat.projection import camera_vectors
 from viewbench.backends.splat.relocate import relocate
 from viewbench.backends.splat.seeding import camera_extent, seed
+from viewbench.backends.splat.snapshot import State
 from viewbench.common.errors import UserError
 from viewbench.common.files import write_json
 from viewbench.scenes.types import Cameras
 
 CURVE_POINTS = 10
+ROUND = 100  # steps that the loss of a point of the curve is averaged over, at most
+SNAPSHOT_S = 10.0
 CHECK_EVERY = 20  # steps between looks at the clock
 
 
 def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dict, report: Report) -> Trained:
-    """Trains on the chosen views and writes out/model.ply. Raises UserError for views that cannot be trained on."""
+    """Trains on the chosen views and writes out/model.ply; takes up the snapshot of a killed run that it finds there.
+
+    Raises UserError for views that cannot be trained on and for a training that diverged.
+    """
     o = Options(**options)
+    _check(data)
     views, height, width, _ = data.images.shape
-    if views < 2 and (data.points is None or not len(data.points)):
-        raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
-    if not np.isfinite(data.images).all():
-        raise UserError("the training images have NaN or infinite pixels")
     rng = np.random.default_rng(seed_)
     gaussians, seeding = seed(data, o.gaussians, o.points, rng, o.opacity, o.scale)
     extent = camera_extent(data)
-    cameras = camera_vectors(data.cameras)
     near = o.near * extent
+    cameras = camera_vectors(data.cameras)
     engine = Engine(gaussians.shape[1], width, height, near, o.background)
     targets = [engine.planes.target(image) for image in data.images]
-    moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
     first_rates, last = _rates(o, extent)
-    trial = gaussians.copy(), (moments[0].copy(), moments[1].copy())
-    engine.step(*trial, cameras[0], targets[0], o.degree, first_rates, 1, o.ssim, 1e-9, 1e-9)  # loads the kernels
-    curve: list[dict[str, float | None]] = []
-    order: list[int] = []
-    step, relocated, loss, seconds = 0, 0, float("nan"), 0.0
-    running: list[float] = []
-    next_point = 1
-    began = time.perf_counter()
-    while True:
-        share = _share(step, seconds, budget)
-        if share >= 1:
-            break
+    weights = o.opacity_weight / gaussians.shape[1], o.scale_weight / gaussians.shape[1]
+    # A step on copies loads the kernels, which is set-up and not training.
+    moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
+    engine.step(gaussians.copy(), moments, cameras[0], targets[0], o.degree, first_rates, 1, o.ssim, 1e-9, 1e-9)
+    state = State.load(out) or State(gaussians, np.zeros_like(gaussians), np.zeros_like(gaussians), rng)
+    saved = began = time.perf_counter() - state.seconds
+    while (share := _share(state.step, state.seconds, budget)) < 1:
+        if not state.order:
+            state.order = state.rng.permutation(views).tolist()
+        view = state.order.pop()
+        state.step += 1
         rates = (first_rates * last**share).astype(np.float32)
-        if not order:
-            order = rng.permutation(views).tolist()
-        view = order.pop()
-        step += 1
         loss = engine.step(
-            gaussians,
-            moments,
+            state.gaussians,
+            (state.first, state.second),
             cameras[view],
             targets[view],
             o.degree,
             rates,
-            step,
+            state.step,
             o.ssim,
-            o.opacity_weight / gaussians.shape[1],
-            o.scale_weight / gaussians.shape[1],
+            *weights,
         )
-        running.append(loss)
-        if step % o.relocate_every == 0 and share < o.relocate_until:
-            relocated += relocate(gaussians, moments, rng)
-        if step % CHECK_EVERY == 0 or step == budget.iterations:
-            seconds = time.perf_counter() - began
-            share = _share(step, seconds, budget)
-            if share * CURVE_POINTS >= next_point or share >= 1:
-                next_point = int(share * CURVE_POINTS) + 1
-                point = {
-                    "step": step,
-                    "seconds": seconds,
-                    "loss": float(np.mean(running[-views:])),
-                    "test_psnr_db": None,
-                }
-                paused = time.perf_counter()
-                if report.probe is not None:
-                    point["test_psnr_db"] = report.probe(
-                        lambda asked: draw(gaussians, asked, near, o.background, o.degree)
-                    )
-                curve.append(point)
-                text = f"loss {point['loss']:.4f}" + (
-                    f", {point['test_psnr_db']:.2f} dB" if point["test_psnr_db"] else ""
-                )
-                report.progress(step, budget.iterations, text)
-                began += time.perf_counter() - paused
-    if not np.isfinite(gaussians).all():
-        bad = ~np.isfinite(gaussians).all(axis=0)
-        gaussians = gaussians[:, ~bad]
-        if not gaussians.shape[1]:
-            raise UserError("training diverged: every primitive has NaN; lower the learning rates")
-    ply.write(out / "model.ply", gaussians)
+        state.losses = [*state.losses[1 - min(views, ROUND) :], loss] if views > 1 else [loss]
+        if state.step % o.relocate_every == 0 and share < o.relocate_until:
+            state.relocated += relocate(state.gaussians, (state.first, state.second), state.rng)
+        if state.step % CHECK_EVERY and state.step != budget.iterations:
+            continue
+        state.seconds = time.perf_counter() - began
+        paused = time.perf_counter()
+        share = _share(state.step, state.seconds, budget)
+        if share >= 1 or share * CURVE_POINTS >= len(state.curve) + 1:
+            point = _point(state, report, near, o)
+            state.curve.append(point)
+            decibels = point["test_psnr_db"]
+            text = f"loss {point['loss']:.4f}" + (f", {decibels:.2f} dB" if decibels is not None else "")
+            report.progress(state.step, budget.iterations, text)
+        if paused - saved > SNAPSHOT_S:
+            state.save(out)
+            saved = time.perf_counter()
+        began += time.perf_counter() - paused
+    model = _finite(state.gaussians)
+    ply.write(out / "model.ply", model)
     write_json(out / "splat.json", {"near": near, "background": o.background, "degree": o.degree})
+    State.forget(out)
     return Trained(
-        iterations=step,
-        seconds=seconds,
-        n_primitives=gaussians.shape[1],
+        iterations=state.step,
+        seconds=state.seconds,
+        n_primitives=model.shape[1],
         seeding=seeding,
-        curve=curve,
-        notes={"relocated": relocated},
+        curve=state.curve,
+        notes={"relocated": state.relocated},
     )
+
+
+def _check(data: TrainingSet) -> None:
+    views = len(data.images)
+    if views < 2 and (data.points is None or not len(data.points)):
+        raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
+    if not np.isfinite(data.images).all():
+        raise UserError("the training images have NaN or infinite pixels")
+
+
+def _point(state: State, report: Report, near: float, o: Options) -> dict[str, float | None]:
+    """A point of the curve; the test views are looked at for it and for nothing else."""
+    gaussians = _finite(state.gaussians)
+    return {
+        "step": state.step,
+        "seconds": state.seconds,
+        "loss": float(np.mean(state.losses)),
+        "test_psnr_db": report.probe(lambda asked: draw(gaussians, asked, near, o.background, o.degree))
+        if report.probe
+        else None,
+    }
+
+
+def _finite(gaussians: np.ndarray) -> np.ndarray:
+    """Without the primitives that have NaN, so that none is ever written. Raises UserError when none is left."""
+    good = np.isfinite(gaussians).all(axis=0)
+    if not good.any():
+        raise UserError("training diverged: every primitive has NaN; lower the learning rates")
+    return gaussians if good.all() else np.ascontiguousarray(gaussians[:, good])
 
 
 def draw(gaussians: np.ndarray, cameras: Cameras, near: float, background: float, degree: int) -> Iterator[np.ndarray]:

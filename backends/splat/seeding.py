@@ -10,8 +10,9 @@ import numpy as np
 
 from viewbench.backends._types import TrainingSet
 from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, SH0, SH_C0, empty
-from viewbench.common.errors import UserError
+from viewbench.common.errors import UserError, nearest
 
+SOURCES = ("auto", "scene", "selected", "rays")
 FEWEST = 500  # scene points below which rays are added
 NEAR, FAR = 0.1, 1.2  # depths along rays, as shares of the cameras' extent
 
@@ -24,6 +25,8 @@ def seed(
     `source` is "auto" (scene points where there are at least 500, else rays), "scene", "selected" (scene points whose
     track has at least two chosen views) or "rays". Raises UserError when the source has no points at all.
     """
+    if source not in SOURCES:
+        raise UserError(f"unknown source of points '{source}'{nearest(source, SOURCES)} (known: {', '.join(SOURCES)})")
     points, colours = np.zeros((0, 3)), np.zeros((0, 3))
     record: dict[str, Any] = {"asked": source, "source": "rays", "scene_points": 0, "ray_points": 0}
     if source in ("auto", "scene", "selected") and data.points is not None:

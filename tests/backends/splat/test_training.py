@@ -1,0 +1,197 @@
+"""The whole trainer on a small scene of known Gaussians: it learns, repeats itself, and takes up where it was."""
+
+import numpy as np
+import pytest
+from plyfile import PlyData
+
+from tests.backends.splat.test_kernels import cloud
+from viewbench.backends import splat
+from viewbench.backends._psnr import psnr_db
+from viewbench.backends._types import Budget, Report, TrainingSet
+from viewbench.backends.splat import layout, loop, ply
+from viewbench.backends.splat.relocate import relocate
+from viewbench.backends.splat.seeding import along_rays, seed
+from viewbench.backends.splat.snapshot import State
+from viewbench.common.errors import UserError
+from viewbench.scenes.types import Cameras, Points
+
+SIZE = 32
+
+
+def cameras(n):
+    """n cameras on a circle around the middle, looking at it."""
+    angle = np.linspace(0, 2 * np.pi, n, endpoint=False)
+    back = np.stack([np.cos(angle), np.zeros(n), np.sin(angle)], axis=1)
+    up = np.tile([0.0, 1.0, 0.0], (n, 1))
+    right = np.cross(up, back)
+    poses = np.tile(np.eye(4), (n, 1, 1))
+    poses[:, :3, :3] = np.stack([right, up, back], axis=2)
+    poses[:, :3, 3] = 3 * back
+    one = np.ones(n)
+    size = np.full(n, SIZE, np.int64)
+    return Cameras(poses, 40 * one, 40 * one, SIZE / 2 * one, SIZE / 2 * one, size, size)
+
+
+@pytest.fixture(scope="module")
+def data():
+    rng = np.random.default_rng(0)
+    truth = cloud(60, rng, spread=0.2)
+    truth[11:14] *= 0.5
+    seen = cameras(9)
+    images = np.stack(list(loop.draw(truth, seen, 0.05, 0.0, 1)))
+    points = Points(truth[:3].T.astype(np.float64), np.full((60, 3), 128, np.uint8), tuple([np.array([0, 3, 6])] * 60))
+    return TrainingSet("toy", tuple(map(str, range(9))), seen, images, points, np.arange(9))
+
+
+def run(data, folder, iterations=200, seed=1, seconds=None, **options):
+    folder.mkdir(parents=True, exist_ok=True)
+    chosen = {**splat.CAPABILITIES.options, **options}
+    return splat.train(data, folder, seed, Budget(iterations, seconds), chosen, Report())
+
+
+def score(folder, data):
+    pictures = list(splat.render(folder, data.cameras))
+    return np.mean([psnr_db(picture, image) for picture, image in zip(pictures, data.images, strict=True)])
+
+
+def test_training_makes_the_pictures_better(data, tmp_path):
+    record = run(data, tmp_path / "long", 300)
+    run(data, tmp_path / "short", 5)
+    assert score(tmp_path / "long", data) > score(tmp_path / "short", data) + 5
+    assert record.curve[-1]["loss"] < 0.5 * record.curve[0]["loss"]
+    assert [point["step"] for point in record.curve] == sorted({point["step"] for point in record.curve})
+    assert record.iterations == 300
+    assert record.seeding["source"] == "scene and rays"
+
+
+def test_same_seed_same_bytes(data, tmp_path):
+    for name, number in (("a", 1), ("b", 1), ("c", 2)):
+        run(data, tmp_path / name, 60, number)
+    models = {name: (tmp_path / name / "model.ply").read_bytes() for name in "abc"}
+    assert models["a"] == models["b"]
+    assert models["a"] != models["c"]
+
+
+def test_a_killed_run_ends_in_the_same_bytes(data, tmp_path, monkeypatch):
+    run(data, tmp_path / "whole", 120)
+    monkeypatch.setattr(loop, "SNAPSHOT_S", 0.0)
+
+    def die(state, folder, real=State.save):
+        real(state, folder)
+        if state.step >= 60:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(State, "save", die)
+        with pytest.raises(KeyboardInterrupt):
+            run(data, tmp_path / "killed", 120)
+    assert not (tmp_path / "killed" / "model.ply").exists()
+    assert State.load(tmp_path / "killed").step == 60
+    run(data, tmp_path / "killed", 120)
+    assert (tmp_path / "killed" / "model.ply").read_bytes() == (tmp_path / "whole" / "model.ply").read_bytes()
+    assert sorted(path.name for path in (tmp_path / "killed").iterdir()) == ["model.ply", "splat.json"]
+
+
+def test_a_broken_snapshot_is_as_none(data, tmp_path):
+    (tmp_path / "snapshot.npz").write_bytes(b"PK\x03\x04 broken")
+    assert State.load(tmp_path) is None
+    assert run(data, tmp_path, 20).iterations == 20
+
+
+def test_a_budget_of_seconds_ends_the_run(data, tmp_path):
+    record = run(data, tmp_path, None, seconds=0.2)
+    assert 0.2 <= record.seconds < 5
+    assert record.iterations > 0
+    assert run(data, tmp_path / "both", 20, seconds=1000).iterations == 20
+
+
+def test_the_model_is_a_standard_file(data, tmp_path):
+    run(data, tmp_path, 40)
+    vertex = PlyData.read(tmp_path / "model.ply")["vertex"]
+    wanted = ["x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", *(f"f_rest_{k}" for k in range(9))]
+    wanted += ["opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"]
+    assert [prop.name for prop in vertex.properties] == wanted
+    assert {prop.val_dtype for prop in vertex.properties} == {"f4"}
+    gaussians = ply.read(tmp_path / "model.ply")
+    ply.write(tmp_path / "again.ply", gaussians)
+    assert (tmp_path / "again.ply").read_bytes() == (tmp_path / "model.ply").read_bytes()
+    # green's second coefficient (of z) is f_rest_4: channels first, then coefficients
+    np.testing.assert_array_equal(vertex["f_rest_4"], gaussians[layout.SH1 + 3 + 1])
+
+
+@pytest.mark.parametrize("content", [b"", b"ply\nformat ascii 1.0\nend_header\n", b"no ply"])
+def test_a_broken_model_is_one_sentence(tmp_path, content):
+    (tmp_path / "model.ply").write_bytes(content)
+    with pytest.raises(UserError, match=r"model\.ply"):
+        ply.read(tmp_path / "model.ply")
+
+
+def test_points_along_rays_project_onto_their_pixels(data):
+    points, colours = along_rays(data, 200, np.random.default_rng(3))
+    inside = 0
+    for camera, image in zip(data.cameras, data.images, strict=True):
+        x, y, z = (np.c_[points, np.ones(200)] @ camera.world_to_camera()[0].T)[:, :3].T
+        column = np.floor(camera.fx[0] * x / z + camera.cx[0] + 1e-9)
+        row = np.floor(camera.fy[0] * y / z + camera.cy[0] + 1e-9)
+        ok = (z > 0) & (column >= 0) & (column < SIZE) & (row >= 0) & (row < SIZE)
+        match = np.zeros(200, bool)
+        match[ok] = (image[row[ok].astype(int), column[ok].astype(int)] == colours[ok].astype(np.float32)).all(axis=1)
+        inside += match
+    assert (inside >= 1).all()
+
+
+def test_sources_of_points(data):
+    rng = np.random.default_rng(0)
+    _, scene = seed(data, 1000, "scene", rng, 0.5, 0.6)
+    assert (scene["source"], scene["count"]) == ("scene", 60)
+    _, rays = seed(data, 1000, "rays", rng, 0.5, 0.6)
+    assert (rays["scene_points"], rays["ray_points"]) == (0, 1000)
+    _, selected = seed(data, 1000, "selected", rng, 0.5, 0.6)
+    assert selected["count"] == 60
+    from dataclasses import replace
+
+    with pytest.raises(UserError, match="no points"):
+        seed(replace(data, chosen=np.array([1, 2])), 1000, "selected", rng, 0.5, 0.6)
+    with pytest.raises(UserError, match="no points"):
+        seed(replace(data, points=None), 1000, "scene", rng, 0.5, 0.6)
+    with pytest.raises(UserError, match="did you mean 'scene'"):
+        seed(data, 1000, "scenes", rng, 0.5, 0.6)
+
+
+def test_bad_input_is_refused(data, tmp_path):
+    from dataclasses import replace
+
+    one = replace(data, cameras=data.cameras[[0]], images=data.images[:1], points=None, chosen=np.array([0]))
+    with pytest.raises(UserError, match="at least 2 views"):
+        run(one, tmp_path)
+    dirty = data.images.copy()
+    dirty[0, 0, 0, 0] = np.nan
+    with pytest.raises(UserError, match="NaN"):
+        run(replace(data, images=dirty), tmp_path)
+    points = Points(np.full((3, 3), np.nan), np.zeros((3, 3), np.uint8))
+    run(replace(data, points=points), tmp_path / "nan", 20)
+    assert np.isfinite(ply.read(tmp_path / "nan" / "model.ply")).all()
+
+
+def test_a_view_that_sees_nothing_is_harmless(data, tmp_path):
+    from dataclasses import replace
+
+    poses = data.cameras.c2w.copy()
+    poses[0, :3, 3] += 100  # far away, looking further
+    moved = replace(data, cameras=replace(data.cameras, c2w=poses))
+    run(moved, tmp_path, 50)
+    assert np.isfinite(ply.read(tmp_path / "model.ply")).all()
+
+
+def test_relocation_hardly_changes_the_picture(data):
+    rng = np.random.default_rng(5)
+    g = cloud(60, rng, spread=0.2)
+    g[10, :30] = -9  # faded out
+    g[10, 30:] = np.abs(g[10, 30:])
+    before = np.stack(list(loop.draw(g, data.cameras, 0.05, 0.0, 1)))
+    moments = np.ones_like(g), np.ones_like(g)
+    assert relocate(g, moments, rng) == 30
+    after = np.stack(list(loop.draw(g, data.cameras, 0.05, 0.0, 1)))
+    assert np.abs(after - before).mean() < 0.02
+    assert not moments[0][:, :30].any()
+    assert (1 / (1 + np.exp(-g[10])) > 0.004).all()
