@@ -1,12 +1,10 @@
 """Writes cameras and their images as a scene folder that external trainers read: the chosen views and nothing else.
 
 Images are numbered (`00000.png`) in the order given, since the trainers sort by name and a frame's own name may hold
-anything. Three layouts, by the names that `viewbench list formats` uses:
+anything. Two layouts, by the names that `viewbench list formats` uses:
 
-    transforms   transforms.json, images/            nerfstudio, instant-ngp, OpenSplat: intrinsics of each frame
-    blender      transforms_{train,test}.json,
-                 images/, points3d.ply               the 3DGS authors' code: one field of view, centred
-    colmap       sparse/0/*.txt, images/             3DGS and many more: a pinhole camera for each frame
+    transforms   transforms.json, images/, points3d.ply   nerfstudio, OpenSplat, instant-ngp
+    colmap       sparse/0/*.txt, images/                  the 3DGS authors' code and many more
 
 Lens distortion has been taken out of the pictures that backends get, so that no layout needs to tell of it.
 """
@@ -21,7 +19,7 @@ from viewbench.common.errors import UserError, nearest
 from viewbench.common.files import write_json, write_text
 from viewbench.scenes.types import Cameras
 
-LAYOUTS = ("transforms", "blender", "colmap")
+LAYOUTS = ("transforms", "colmap")
 POINTS = "points3d.ply"
 
 
@@ -42,7 +40,7 @@ def write(
 
     Without images black ones are written: tools that render a dataset want files, and no test image is to be theirs.
     `points` are (P, 3) positions and (P, 3) uint8 colours; `extra` goes to the top of transforms.json.
-    Raises UserError for an unknown layout, and for cameras that the layout cannot express.
+    Raises UserError for an unknown layout.
     """
     if layout not in LAYOUTS:
         raise UserError(f"unknown format '{layout}'{nearest(layout, LAYOUTS)} (there are: {', '.join(LAYOUTS)})")
@@ -58,12 +56,7 @@ def write(
         return
     if points is not None:
         write_points(folder / POINTS, *points)
-    if layout == "transforms":
-        write_json(folder / "transforms.json", {**transforms(cameras, points is not None), **(extra or {})})
-    else:
-        record = _blender(cameras)
-        write_json(folder / "transforms_train.json", record)
-        write_json(folder / "transforms_test.json", record if images is None else {**record, "frames": []})
+    write_json(folder / "transforms.json", {**transforms(cameras, points is not None), **(extra or {})})
 
 
 def transforms(cameras: Cameras, points: bool = False) -> dict[str, Any]:
@@ -86,31 +79,6 @@ def transforms(cameras: Cameras, points: bool = False) -> dict[str, Any]:
             }
         )
     return {"camera_model": "PINHOLE", **({"ply_file_path": POINTS} if points else {}), "frames": frames}
-
-
-def _blender(cameras: Cameras) -> dict[str, Any]:
-    """One horizontal field of view for all frames; square pixels and a centred principal point are understood."""
-    angles = 2 * np.arctan(cameras.width / (2 * cameras.fx))
-    one_size = len({*zip(cameras.width.tolist(), cameras.height.tolist(), strict=True)}) == 1
-    off = np.maximum(np.abs(cameras.cx - cameras.width / 2), np.abs(cameras.cy - cameras.height / 2))
-    square = np.allclose(cameras.fx, cameras.fy, rtol=1e-3)
-    if not (one_size and square and np.allclose(angles, angles[0], rtol=1e-4)):
-        raise UserError("format 'blender' knows one camera with square pixels for all frames; set format to 'colmap'")
-    if off.max() > 0.5:
-        raise UserError(
-            f"format 'blender' has the principal point in the middle, here it is {off.max():.1f} pixels off; "
-            "set format to 'transforms' or 'colmap'"
-        )
-    return {
-        "camera_angle_x": float(angles[0]),
-        "w": int(cameras.width[0]),
-        "h": int(cameras.height[0]),
-        "frames": [
-            # the original Blender files leave the suffix out, and readers add ".png"
-            {"file_path": f"images/{Path(image_name(index)).stem}", "transform_matrix": camera.c2w[0].tolist()}
-            for index, camera in enumerate(cameras)
-        ],
-    }
 
 
 def _write_colmap(folder: Path, cameras: Cameras, points: tuple[np.ndarray, np.ndarray] | None) -> None:

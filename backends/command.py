@@ -14,17 +14,20 @@ from typing import Any
 import numpy as np
 
 from viewbench.backends import _process, _subset
+from viewbench.backends._ply_render import render_ply
 from viewbench.backends._seeding import SOURCES, seed_points
 from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
 from viewbench.common.errors import UserError, nearest
+from viewbench.common.files import read_json, write_json
 from viewbench.common.settings import Command, Settings
 from viewbench.scenes.types import Cameras
 
 LOG = "command.log"
 SCENE = "scene"  # the subset, inside the model folder while the program trains
 TRAIN_PLACES = ("scene", "out", "seed", "iterations", "seconds", "width", "height", "views")
-RENDER_PLACES = ("cameras", "renders", "out", "width", "height")
-OUTPUT_PLACES = ("name", "index")
+RENDER_PLACES = ("cameras", "renders", "out", "seed", "iterations", "width", "height")
+OUTPUT_PLACES = ("name", "index", "out", "iterations")
+RECORD = "command.json"  # what rendering has to know of the training
 VERSION_SECONDS = 60.0
 POINTS_OFF = "none"
 RANDOM_POINTS = 100_000  # as the 3DGS authors draw where a scene has none
@@ -77,7 +80,7 @@ class External:
 
     def available(self) -> str | None:
         for part, command in (("train", self.entry.train), ("render", self.entry.render)):
-            if shutil.which(command[0]) is None:
+            if command and shutil.which(command[0]) is None:
                 return f"'{command[0]}', which its `{part}` command starts, is not installed or not on PATH"
         return None
 
@@ -119,7 +122,8 @@ class External:
         _process.run(_filled(self.entry.train, values), out, out / LOG, self._what, self.entry.timeout or None)
         seconds = time.perf_counter() - began
         shutil.rmtree(out / SCENE)
-        if not any(path.name != LOG for path in out.iterdir()):
+        write_json(out / RECORD, {"seed": seed, "iterations": budget.iterations})
+        if not any(path.name not in (LOG, RECORD) for path in out.iterdir()):
             raise UserError(f"{self._what} ended well but left nothing in its folder; does its command use {{out}}?")
         return Trained(
             iterations=budget.iterations or 0,
@@ -130,21 +134,32 @@ class External:
         )
 
     def render(self, model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
-        """Writes the cameras as a scene with black images, runs the `render` command and reads its pictures."""
+        """Writes the cameras as a scene with black images, runs the `render` command and reads its pictures.
+
+        Without that command the output is a PLY file of 3D Gaussians, which viewbench renders itself.
+        """
+        if not self.entry.render:
+            yield from render_ply(model / self.entry.output, cameras)
+            return
         with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
             place = Path(folder).resolve()
             _subset.write(place / "cameras", self.entry.format, cameras, None)
             (place / "renders").mkdir()
             values = {
+                **read_json(model / RECORD, "training record"),
                 "out": model.resolve(),
                 "cameras": place / "cameras",
                 "renders": place / "renders",
                 "width": int(cameras.width[0]),
                 "height": int(cameras.height[0]),
             }
+            names = (Path(_subset.image_name(index)).stem for index in range(len(cameras)))
+            output = [self.entry.output.format(**values, name=name, index=i) for i, name in enumerate(names)]
+            files = [place / "renders" / path for path in output]  # an absolute path stands for itself
+            for file in files:
+                file.unlink(missing_ok=True)  # of an earlier run, where {out} holds them
             command = _filled(self.entry.render, values)
             _process.run(command, model, place / LOG, f"{self._what} (render)", self.entry.timeout or None)
-            files = [place / "renders" / self._output(index) for index in range(len(cameras))]
             yield from _subset.read_images(files, cameras, self._what)
 
     @property
@@ -161,10 +176,6 @@ class External:
         xyz, rgb, record = seed_points(data, source, np.random.default_rng(seed), RANDOM_POINTS)
         return (xyz, rgb), record
 
-    def _output(self, index: int) -> str:
-        image = Path(_subset.image_name(index))
-        return self.entry.output.format(name=image.stem, index=index)
-
 
 def _check(entry: Command, where: str) -> None:
     """Raises UserError for a section that cannot work, before anything is run with it."""
@@ -173,14 +184,18 @@ def _check(entry: Command, where: str) -> None:
         raise UserError(f"{where}: format '{entry.format}'{nearest(entry.format, known)} is none of {', '.join(known)}")
     if entry.device not in ("cpu", "cuda"):
         raise UserError(f"{where}: device is '{entry.device}', expected 'cpu' or 'cuda'")
-    templates = (("train", entry.train, TRAIN_PLACES), ("render", entry.render, RENDER_PLACES))
-    for key, command, known in templates:
-        if not command:
-            raise UserError(f"{where}: '{key}' is an empty list; it starts with the program to run")
-        _check_places(command, known, f"{where} '{key}'")
+    if not entry.train:
+        raise UserError(f"{where}: 'train' is an empty list; it starts with the program to run")
+    _check_places(entry.train, TRAIN_PLACES, f"{where} 'train'")
+    _check_places(entry.render, RENDER_PLACES, f"{where} 'render'")
     _check_places([entry.output], OUTPUT_PLACES, f"{where} 'output'")
-    if not _places([entry.output]):
+    given = _places([entry.output])
+    if not entry.render and (given or not entry.output.endswith(".ply")):
+        raise UserError(f"{where}: without 'render', 'output' is the PLY file of 3D Gaussians in the model folder")
+    if entry.render and not given & {"name", "index"}:
         raise UserError(f"{where}: 'output' names one file for all renders; put {{name}} or {{index}} into it")
+    if "iterations" in given | _places(entry.render) and "iterations" not in _places(entry.train):
+        raise UserError(f"{where}: rendering takes {{iterations}}, which 'train' does not; write them out")
 
 
 def _check_places(command: list[str], known: tuple[str, ...], where: str) -> None:

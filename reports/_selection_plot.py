@@ -51,7 +51,14 @@ def _from_above(path: Path, title: str, positions: np.ndarray, forward: np.ndarr
             width=0.003,
             zorder=3,
         )
-        axes.scatter(flat[chosen, 0], flat[chosen, 1], s=12, color=CHOSEN, zorder=3, label=f"{len(chosen)} chosen, with their direction")
+        axes.scatter(
+            flat[chosen, 0],
+            flat[chosen, 1],
+            s=12,
+            color=CHOSEN,
+            zorder=3,
+            label=f"{len(chosen)} chosen, with their direction",
+        )
         axes.set_aspect("equal")
         axes.set_title(title)
         axes.set_xlabel("scene units, seen from above")

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from viewbench.common.errors import UserError
+from viewbench.common.files import whole
 from viewbench.scenes.types import Points
 
 
@@ -23,3 +24,17 @@ def read_points(path: Path) -> Points:
     except (PlyParseError, KeyError, ValueError, OSError, EOFError) as error:
         raise UserError(f"points '{path}' cannot be read as PLY: {error}") from None
     return Points(xyz, rgb)
+
+
+def write_points(path: Path, points: Points) -> None:
+    """Writes positions and colours as binary PLY, whole or not at all."""
+    from plyfile import PlyData, PlyElement
+
+    layout = [*((axis, "<f4") for axis in "xyz"), *((name, "u1") for name in ("red", "green", "blue"))]
+    table = np.empty(len(points), dtype=layout)
+    for k, axis in enumerate("xyz"):
+        table[axis] = points.xyz[:, k]
+    for k, name in enumerate(("red", "green", "blue")):
+        table[name] = points.rgb[:, k]
+    with whole(path) as temporary:
+        PlyData([PlyElement.describe(table, "vertex")], byte_order="<").write(temporary)

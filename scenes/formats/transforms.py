@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from viewbench.common.errors import UserError
-from viewbench.common.files import read_json
+from viewbench.common.files import read_json, write_json
+from viewbench.scenes.subset import place_image
 from viewbench.scenes.types import Cameras, Points, Scene, Split
 
 WRITABLE = True
@@ -149,3 +150,49 @@ def _points(root: Path, table: dict) -> tuple[Points | None, Path | None]:
         if (root / pure).is_file() and not pure.is_absolute() and ".." not in pure.parts:
             return read_points(root / pure), root / pure
     return None, None
+
+
+def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
+    """Writes transforms_train.json and transforms_test.json, or one transforms.json where there is no test split.
+
+    A scene that was read from this format keeps all its own keys. Points are written as points3d.ply.
+    """
+    from viewbench.scenes.ply import write_points
+
+    train = scene.train.subset(indices)
+    names = {"train": "transforms_train.json", "test": "transforms_test.json"}
+    if not len(scene.test):
+        names = {"train": "transforms.json"}
+    own = scene.details.get("tables", {}) if scene.format == "transforms" else {}
+    known = {frame["file_path"]: (table, frame) for table in own.values() for frame in table["frames"]}
+    for key, split in (("train", train), ("test", scene.test)):
+        if key not in names:
+            continue
+        head = dict(own.get(key) or own.get("train") or {})
+        for stale in ("train_filenames", "val_filenames", "test_filenames"):
+            head.pop(stale, None)
+        frames = [
+            dict(known[name][1]) if name in known else _frame(split.cameras[i], f"images/{name}")
+            for i, name in enumerate(split.names)
+        ]
+        for frame, name, source in zip(frames, split.names, split.paths, strict=True):
+            stored = PurePosixPath(frame["file_path"])
+            target = stored if stored.suffix else stored.with_name(stored.name + source.suffix)
+            place_image(source, out / target, copy)
+            if name not in known and split.times is not None:
+                frame["time"] = float(split.times[split.names.index(name)])
+        if scene.points is not None:
+            head["ply_file_path"] = "points3d.ply"
+        write_json(out / names[key], {**head, "frames": frames})
+    if scene.points is not None:
+        write_points(out / "points3d.ply", scene.points)
+
+
+def _frame(camera: Cameras, file_path: str) -> dict[str, Any]:
+    lens = [0.0] * 4 if camera.distortion is None else camera.distortion[0].tolist()
+    values = {"fl_x": camera.fx, "fl_y": camera.fy, "cx": camera.cx, "cy": camera.cy}
+    frame: dict[str, Any] = {key: float(value[0]) for key, value in values.items()}
+    frame |= {"w": int(camera.width[0]), "h": int(camera.height[0])}
+    if any(lens):
+        frame |= {"camera_model": "OPENCV", **dict(zip(("k1", "k2", "p1", "p2"), lens, strict=True))}
+    return {"file_path": file_path, **frame, "transform_matrix": camera.c2w[0].tolist()}

@@ -92,8 +92,8 @@ def test_all_three_are_in_the_results_the_log_and_the_figures(clone):
     assert table["psnr_db"].between(3, 60).all()
     figure = pd.read_csv(results / "reports" / "psnr_over_ratio.csv")
     assert set(figure["backend"]) == set(table.index)
-    import mlflow
+    from mlflow import MlflowClient
 
-    mlflow.set_tracking_uri(f"sqlite:///{clone}/results/mlflow.db")
-    runs = mlflow.search_runs(experiment_names=["mixed"])
+    client = MlflowClient(f"sqlite:///{clone}/results/mlflow.db")
+    runs = client.search_runs([client.get_experiment_by_name("mixed").experiment_id])
     assert len(runs) == 3

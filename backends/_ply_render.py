@@ -1,0 +1,41 @@
+"""Renders a PLY file of 3D Gaussians that some other program trained, with whichever of our rasterisers can."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from viewbench.backends import _gaussian_ply
+from viewbench.common.errors import UserError
+from viewbench.scenes.types import Cameras
+
+NEAR = 0.01  # scene units
+CPU_DEGREE = 1  # of the spherical harmonics that the CPU rasteriser has
+
+
+def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
+    """(H, W, 3) float32 in [0, 1] on black, one for each camera: by gsplat where there is a GPU, else on the CPU.
+
+    Raises UserError for a file that is no such PLY, and without a GPU for colours that the CPU rasteriser has not.
+    """
+    from viewbench.backends.gsplat import Gsplat
+
+    gaussians = _gaussian_ply.load(path)
+    reason = Gsplat().available()
+    if reason is None:
+        from gsplat import rasterization
+
+        from viewbench.backends.gsplat.trainer import Renderer
+
+        renderer = Renderer(rasterization, "cuda", "black", NEAR)
+        yield from renderer.images(renderer.parameters(gaussians), cameras, gaussians.degree)
+        return
+    if gaussians.degree > CPU_DEGREE:
+        raise UserError(
+            f"'{path}' has spherical harmonics of degree {gaussians.degree}, which the CPU rasteriser has not, and "
+            f"gsplat is not available ({reason}); train with degree {CPU_DEGREE}"
+        )
+    from viewbench.backends.splat import ply
+    from viewbench.backends.splat.loop import draw
+
+    yield from draw(ply.read(path), cameras, NEAR, 0.0, gaussians.degree)

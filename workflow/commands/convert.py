@@ -1,0 +1,28 @@
+"""Read a capture in any format and write it in another."""
+
+from pathlib import Path
+
+import click
+
+from viewbench.workflow.commands import _options
+
+
+@click.command()
+@_options.scene_argument
+@_options.out_option
+@click.option("--to", required=True, metavar="FORMAT", help="Format to write: transforms or colmap.")
+@click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
+@click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
+@_options.format_option
+@_options.holdout_option
+def command(scene: str, out: Path, to: str, copy: bool, force: bool, format_: str | None, holdout: str | None) -> None:
+    """Write all views of SCENE to --out in the format --to."""
+    import numpy as np
+
+    from viewbench.common import settings as settings_file
+    from viewbench.scenes.load import open_scene
+    from viewbench.scenes.subset import write_scene
+
+    opened = open_scene(scene, settings_file.load(), format=format_, holdout=holdout)
+    write_scene(opened, np.arange(len(opened.train)), out, to, copy, force)
+    click.echo(f"{len(opened.train)} training and {len(opened.test)} test views in {out}")
