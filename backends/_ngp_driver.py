@@ -88,8 +88,10 @@ def main() -> None:
             known.add_argument(f"--{name}", type=kind, required=True)
     arguments = vars(parser.parse_args())
     action, ngp = arguments.pop("action"), import_pyngp(arguments.pop("checkout"))
-    if action != "check":
-        {"train": train, "render": render}[action](ngp, **arguments)
+    if action == "train":
+        train(ngp, **arguments)
+    elif action == "render":
+        render(ngp, **arguments)
 
 
 if __name__ == "__main__":

@@ -21,13 +21,12 @@ def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
     from viewbench.backends.gsplat import Gsplat
 
     gaussians = _gaussian_ply.load(path)
-    reason = Gsplat().available()
+    gsplat = Gsplat()
+    reason = gsplat.available()
     if reason is None:
-        from gsplat import rasterization
-
         from viewbench.backends.gsplat.trainer import Renderer
 
-        renderer = Renderer(rasterization, "cuda", "black", NEAR)
+        renderer = Renderer(gsplat.rasterizer(), gsplat.device, "black", NEAR)
         yield from renderer.images(renderer.parameters(gaussians), cameras, gaussians.degree)
         return
     if gaussians.degree > CPU_DEGREE:

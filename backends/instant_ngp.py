@@ -59,7 +59,7 @@ class InstantNgp:
             return f"[instant_ngp] python '{self.python}' is not there; set it to the Python that pyngp was built for"
         try:
             with tempfile.TemporaryDirectory(prefix="viewbench-") as place:
-                self._drive("check", Path(place), Path(place) / LOG, timeout_s=CHECK_SECONDS)
+                self._drive("check", {}, Path(place), Path(place) / LOG, CHECK_SECONDS)
         except UserError as error:
             return f"its module pyngp cannot be used ({error}); build it again for [instant_ngp] python '{self.python}'"
         return None
@@ -90,13 +90,15 @@ class InstantNgp:
         extra = {"aabb_scale": options["aabb_scale"]}
         _subset.write(scene, "transforms", data.cameras[order], data.images[order], extra=extra)
         report.progress(0, budget.iterations, f"running instant-ngp, which writes {LOG}")
-        self._drive(
-            "train",
-            out,
-            out / LOG,
-            **{"scene": scene / "transforms.json", "snapshot": out / SNAPSHOT, "record": out / RECORD},
-            **{"steps": budget.iterations or 0, "seconds": budget.seconds or 0.0, "near": options["near_distance"]},
-        )
+        arguments = {
+            "scene": scene / "transforms.json",
+            "snapshot": out / SNAPSHOT,
+            "record": out / RECORD,
+            "steps": budget.iterations or 0,
+            "seconds": budget.seconds or 0.0,
+            "near": options["near_distance"],
+        }
+        self._drive("train", arguments, out, out / LOG)
         shutil.rmtree(scene)
         record = read_json(out / RECORD, "instant-ngp's record")
         write_json(out / RECORD, {**record, "samples": options["samples"], "near": options["near_distance"]})
@@ -114,20 +116,22 @@ class InstantNgp:
         with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
             place = Path(folder)
             write_json(place / "cameras.json", _subset.transforms(cameras))
-            self._drive(
-                "render",
-                place,
-                place / LOG,
-                **{"snapshot": (model / SNAPSHOT).resolve(), "cameras": place / "cameras.json", "images": place},
-                **{"samples": record["samples"], "near": record["near"]},
-            )
+            arguments = {
+                "snapshot": model / SNAPSHOT,
+                "cameras": place / "cameras.json",
+                "images": place,
+                "samples": record["samples"],
+                "near": record["near"],
+            }
+            self._drive("render", arguments, place, place / LOG)
             for index in range(len(cameras)):
                 image = np.load(place / Path(_subset.image_name(index)).with_suffix(".npy"), allow_pickle=False)
                 yield np.clip(image, 0, 1)
 
     def _drive(
-        self, action: str, folder: Path, log: Path, timeout_s: float | None = None, **arguments: Path | float
+        self, action: str, arguments: dict[str, Any], folder: Path, log: Path, timeout_s: float | None = None
     ) -> None:
+        """Runs one action of _ngp_driver.py under the checkout's Python; paths are made absolute."""
         command = [self.python, str(Path(_ngp_driver.__file__).resolve()), action]
         command.append(str(Path(self.checkout).expanduser().resolve()))
         for name, value in arguments.items():

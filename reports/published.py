@@ -73,7 +73,7 @@ def _scores(scores: list[Score], title: str, name: str, out: Path) -> Item:
     scenes = in_order(score.scene for score in scores)
     rows = []
     for model in in_order(score.model for score in scores):
-        best = {}
+        best: dict[str, float] = {}
         for scene in scenes:
             column = [score for score in scores if (score.model, score.scene) == (model, scene)]
             marks = _tables.best([score.psnr_db for score in column], 2)
@@ -88,7 +88,7 @@ def _scores(scores: list[Score], title: str, name: str, out: Path) -> Item:
     table = Table(("model", "selector", *scenes), tuple(rows), 2)
     records = [vars(score) for score in scores]
     files = _tables.save(table, out, name, records)
-    ratios = {}
+    ratios: dict[str, str] = {}
     for score in scores:
         ratios.setdefault(DATASETS[score.dataset], percent(score.ratio))
     shares = ", ".join(f"{dataset} at {share}" for dataset, share in ratios.items())

@@ -45,13 +45,25 @@ def _read(path: Path, expected: tuple[int, int], size: tuple[int, int]) -> np.nd
                 image_rgb.paste(layered, mask=layered.getchannel("A"))
             else:
                 image_rgb = image.convert("RGB")
-            if size != image_rgb.size:
-                image_rgb = image_rgb.resize(size, Image.Resampling.BOX)
-            return np.asarray(image_rgb, dtype=np.float32) / 255
+            return _area_average(np.asarray(image_rgb, dtype=np.float32) / 255, size)
     except FileNotFoundError:
         raise UserError(f"image '{path}' is missing") from None
     except (OSError, UnidentifiedImageError, SyntaxError, Image.DecompressionBombError) as error:
         raise UserError(f"image '{path}' cannot be read: {error}") from None
+
+
+def _area_average(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(H, W, 3) averaged over the area of each new pixel, not rounded to 8 bits on the way."""
+    from PIL import Image
+
+    height, width = pixels.shape[:2]
+    if (width, height) == size:
+        return pixels
+    if width % size[0] == 0 and height % size[1] == 0:
+        blocks = pixels.reshape(size[1], height // size[1], size[0], width // size[0], 3)
+        return blocks.mean(axis=(1, 3))
+    channels = [Image.fromarray(pixels[..., c]).resize(size, Image.Resampling.BOX) for c in range(3)]
+    return np.stack([np.asarray(channel) for channel in channels], axis=-1)
 
 
 def _undistorted(pixels: np.ndarray, camera: Cameras) -> np.ndarray:

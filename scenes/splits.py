@@ -11,7 +11,7 @@ from viewbench.scenes.types import Scene
 BLOCKS = 6  # held-out blocks of `blocks:8` in a capture that is long enough
 
 
-def test_indices(rule: str, n: int) -> np.ndarray:
+def held_out(rule: str, n: int) -> np.ndarray:
     """Sorted indices of the test views among `n` frames in the order of the format.
 
     `every:8` takes 0, 8, 16, … (Mip-NeRF 360's rule). `blocks:8` cuts the capture into 8 · 6 runs of equal length
@@ -45,7 +45,7 @@ def hold_out(scene: Scene, rule: str) -> Scene:
         return dataclasses.replace(scene, holdout="none" if not len(scene.test) else scene.holdout)
     if len(scene.test):
         raise UserError(f"scene '{scene.name}' has {len(scene.test)} test views of its own; leave --holdout out")
-    held = test_indices(rule, len(scene.train))
+    held = held_out(rule, len(scene.train))
     kept = np.setdiff1d(np.arange(len(scene.train)), held)
     points = scene.points
     if points is not None and points.seen_by is not None:

@@ -43,6 +43,12 @@ class Similarity:
         """Weights by factor, those in use only."""
         return {name: w for name, w in zip(FACTORS, (self.alpha, self.beta, self.gamma), strict=True) if w > 0}
 
+    @cached_property
+    def diagonal(self) -> np.ndarray:
+        """(N,) M_ii: 1, but for rotations that were rounded; M stays positive semidefinite only with its own."""
+        squares = np.einsum("ij,ij->i", self.turns, self.turns)
+        return self.alpha + self.beta * (squares + 1) / 4 + self.gamma
+
     def column(self, j: int) -> np.ndarray:
         """(N,) M_ij over all i."""
         return self.spatial(j) + self.gamma * self.semantic(j)

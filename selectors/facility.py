@@ -28,7 +28,7 @@ def select(
     factors: tuple[str, ...] = FACTORS,
     sharpness: float = 0.0,
 ) -> Choice:
-    """Greedy maximiser of f, ties to the earlier frame; a similarity below 0 serves nobody and counts as 0.
+    """Greedy maximiser of f, ties to the earlier frame but for rounding; a similarity below 0 counts as 0.
 
     f is submodular: a gain computed for a smaller S bounds the gain for a larger one. So only views whose bound
     reaches the best gain are computed again, a block at a time. O(N²) time to begin with, O(N) memory.

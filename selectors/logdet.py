@@ -39,15 +39,16 @@ def select(
 ) -> Choice:
     """Greedy maximiser of log det M_S: k* = argmax_k log det M_{S ∪ {k}} − log det M_S, ties to the earlier frame.
 
-    M_kk = 1, so all first picks are equal and the first is drawn at random. The gain of a pick is the logarithm of
-    its residual, computed by an incremental Cholesky factorisation in O(N K²) time and O(N K) memory.
+    M_kk = 1 but for rounding, so all first picks are equal and the first is drawn at random. The gain of a pick is the
+    logarithm of its residual, computed by an incremental Cholesky factorisation in O(N K²) time and O(N K) memory.
 
     `regularise` = λ > 0 maximises log det(I + M_S / λ) instead, which is monotone. `sample` draws S from the k-DPP with
     P(S) ∝ det M_S, as the authors' code does: no greedy order, no gains, and another set for another count.
 
     Where every residual left is below N ε, the rounding of float64, log det says nothing more about what to choose
     (the paper's "unsolvable"). From that pick on, `below_precision_from` in the notes counted from 0, the view least
-    similar to those chosen is taken (the rule of `maxmin`), and the gain is reported as the bound log N ε.
+    similar to those chosen is taken (the rule of `maxmin`), and the gain is reported as its bound, log N ε
+    (log N ε (1 + λ) / λ with λ).
 
     Raises UserError for a negative λ.
     """
@@ -62,15 +63,16 @@ def select(
     precision = len(views) * np.finfo(float).eps * (1 + regularise)
     if sample:
         indices, gains = _sample(similar, count, precision, rng), None
-        solved = len(indices)
     else:
         indices, gains = _greedy(similar, count, precision, regularise, prefer, rng)
-        solved = len(indices)
+    solved = len(indices)
     notes = describe(similar, alpha, beta, factors)
     if solved < count:
         notes |= {"below_precision_from": solved, "precision": precision}
         indices = _fill(similar, indices, count, prefer)
-        gains = None if gains is None else np.append(gains, np.full(count - solved, np.log(precision)))
+        gains = (
+            None if gains is None else np.append(gains, np.full(count - solved, np.log(precision / (regularise or 1))))
+        )
     return Choice(indices, gains, {"similarity": prepared_s}, notes)
 
 
@@ -79,10 +81,10 @@ def _kernel(similar: Similarity, regularise: float, capacity: int) -> Residuals:
 
     def columns(chosen: np.ndarray) -> np.ndarray:
         m = similar.columns(chosen)
-        m[np.arange(len(chosen)), chosen] = 1 + regularise
+        m[np.arange(len(chosen)), chosen] += regularise
         return m
 
-    return Residuals(columns, np.full(len(similar), 1 + regularise), capacity)
+    return Residuals(columns, similar.diagonal + regularise, capacity)
 
 
 def _greedy(

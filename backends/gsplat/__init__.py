@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import importlib.util
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,8 @@ from viewbench.scenes.types import Cameras
 
 MODEL = "model.ply"
 RECORD = "model.json"
+REMEDY = "install a CUDA toolkit of torch's CUDA version, or a gsplat wheel built for this torch"
+NOT_COMPILED = f"gsplat's CUDA code is not compiled and no nvcc is here to do it; {REMEDY}"
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,21 @@ class Gsplat:
             return f"torch {torch.__version__} is built without CUDA; install a CUDA build of it (pytorch.org)"
         if not torch.cuda.is_available():
             return "no CUDA device is in reach; check `nvidia-smi` and CUDA_VISIBLE_DEVICES"
+        if not _compiled() and not _compiler():
+            return NOT_COMPILED
         return None
+
+    def warm(self) -> None:
+        """Compiles gsplat's CUDA code, minutes the first time, before several jobs would start to at once.
+
+        Raises UserError when there is no compiler, or it fails.
+        """
+        try:
+            from gsplat.cuda._backend import _C
+        except (ImportError, OSError, RuntimeError) as error:
+            raise UserError(f"gsplat's CUDA code could not be compiled: {error}; {REMEDY}") from None
+        if _C is None:
+            raise UserError(NOT_COMPILED)
 
     def version(self) -> str:
         return f"gsplat {importlib.metadata.version('gsplat')}"
@@ -73,7 +90,7 @@ class Gsplat:
         rng = np.random.default_rng(seed)
         xyz, rgb, seeding = seed_points(data, options["points"], rng, options["random_points"])
         gaussians, trained = fit(
-            data, xyz, rgb, seed, budget, options, report, device=self.device, rasterize=self._rasterizer()
+            data, xyz, rgb, seed, budget, options, report, device=self.device, rasterize=self.rasterizer()
         )
         _gaussian_ply.save(out / MODEL, gaussians)
         write_json(out / RECORD, {"background": options["background"], "near": data.near})
@@ -84,15 +101,29 @@ class Gsplat:
 
         record = read_json(model / RECORD, "model record")
         gaussians = _gaussian_ply.load(model / MODEL)
-        renderer = Renderer(self._rasterizer(), self.device, record["background"], record["near"])
+        renderer = Renderer(self.rasterizer(), self.device, record["background"], record["near"])
         yield from renderer.images(renderer.parameters(gaussians), cameras, gaussians.degree)
 
-    def _rasterizer(self) -> Callable:
+    def rasterizer(self) -> Callable:
+        """gsplat's `rasterization`, its CUDA code compiled."""
         if self.rasterize is not None:
             return self.rasterize
+        self.warm()
         from gsplat import rasterization
 
         return rasterization
+
+
+def _compiled() -> bool:
+    """Whether gsplat came with its CUDA code compiled."""
+    return importlib.util.find_spec("gsplat.csrc") is not None
+
+
+def _compiler() -> bool:
+    """Whether gsplat can compile it when it is first used."""
+    from torch.utils.cpp_extension import CUDA_HOME
+
+    return CUDA_HOME is not None or shutil.which("nvcc") is not None
 
 
 def _check(options: dict[str, Any]) -> None:

@@ -36,7 +36,7 @@ def starting(xyz: np.ndarray, rgb: np.ndarray, strategy: str, degree: int, exten
     return Gaussians(
         means=xyz.astype(np.float32),
         scales=np.repeat(np.log(relative * size)[:, None], 3, axis=1).astype(np.float32),
-        quats=np.tile(np.float32([1, 0, 0, 0]), (count, 1)),
+        quats=np.tile(np.array([1, 0, 0, 0], dtype=np.float32), (count, 1)),
         opacities=np.full(count, math.log(opacity / (1 - opacity)), dtype=np.float32),
         sh0=((rgb / 255 - 0.5) / C0).astype(np.float32),
         shn=np.zeros((count, (degree + 1) ** 2 - 1, 3), dtype=np.float32),

@@ -153,7 +153,7 @@ def fit(
     params = renderer.parameters(starting(xyz, rgb, options["strategy"], options["sh_degree"], extent))
     try:
         run = _run(data, params, extent, steps, seed, budget, options, report, renderer)
-    except torch.OutOfMemoryError:
+    except torch.cuda.OutOfMemoryError:
         raise UserError(
             f"the GPU's memory is full with {len(params['means'])} Gaussians and {len(data.names)} views of "
             f"{data.cameras.width[0]} pixels width; train at a smaller width, or set a smaller cap on them"
@@ -183,6 +183,8 @@ def _run(
     decay = torch.optim.lr_scheduler.ExponentialLR(optims["means"], gamma=MEANS_DECAY ** (1 / steps))
     images = _images(data.images, renderer.device)
     order = _order(len(data.names), np.random.default_rng(seed))
+    with torch.no_grad():
+        renderer.render(params, data.cameras[0], 0)  # loads the kernels, which is not training
     clock, curve, step = _Clock(renderer.device), [], 0
     while step < steps and (budget.seconds is None or clock.seconds() < budget.seconds):
         index = next(order)

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 
 def _prepare() -> None:
@@ -30,7 +31,7 @@ _prepare()
 import numpy as np  # noqa: E402
 from numba import njit  # noqa: E402
 
-OPTIONS = {
+OPTIONS: Any = {
     "fastmath": {"nsz", "arcp", "contract", "afn", "reassoc"},
     "error_model": "numpy",
     "boundscheck": False,

@@ -41,6 +41,7 @@ def read(root: Path) -> Scene:
     model = _model(root)
     if model is None:
         raise UserError(f"'{root}' has no COLMAP model: no cameras, images and points3D in sparse/0")
+    _check_counts(model)
     try:
         reconstruction = pycolmap.Reconstruction(model)
     except (RuntimeError, ValueError, IndexError, OSError, MemoryError) as error:
@@ -81,6 +82,17 @@ def read(root: Path) -> Scene:
         files=tuple(sorted(path for path in model.iterdir() if path.suffix in (".bin", ".txt"))),
         details={"model": model, "images": folder},
     )
+
+
+def _check_counts(model: Path) -> None:
+    """Raises UserError for a binary file that says to hold more records than its size allows: pycolmap would loop."""
+    for name, record in (("cameras", 24), ("images", 64), ("points3D", 43)):
+        path = model / f"{name}.bin"
+        if path.is_file():
+            with open(path, "rb") as file:
+                count = int.from_bytes(file.read(8), "little")
+            if count * record + 8 > path.stat().st_size:
+                raise UserError(f"COLMAP model '{model}' cannot be read: {path.name} is cut short or no model file")
 
 
 def _held_out(model: Path, names: tuple[str, ...]) -> np.ndarray:

@@ -9,6 +9,7 @@ import pytest
 from tests.backends.conftest import nearest_command, settings_with
 from viewbench.backends import _registry
 from viewbench.backends._types import Budget, Report
+from viewbench.backends.gsplat import Gsplat
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 
@@ -84,7 +85,10 @@ def test_a_budget_that_the_command_line_needs_is_asked_for(take_views, tmp_path)
         ({"train": ["x", '{"a": 1}']}, "unknown placeholder"),
         ({"train": ["x", "{"]}, "write a brace that is meant"),
         ({"train": []}, "'train' is an empty list"),
-        ({"render": []}, "'render' is an empty list"),
+        ({"render": []}, "without 'render', 'output' is the PLY file"),
+        ({"render": [], "output": "{name}.ply"}, "without 'render', 'output' is the PLY file"),
+        ({"train": ["x"], "output": "{iterations}/{name}.png"}, "rendering takes {iterations}"),
+        ({"output": "{out}/render.png"}, "'output' names one file"),
         ({"render": ["x", "{scene}"]}, r"'render': unknown placeholder \{scene\}"),
         ({"output": "render.png"}, "'output' names one file for all renders"),
         ({"format": "colmop"}, "did you mean 'colmap'"),
@@ -136,6 +140,47 @@ def test_renders_are_looked_for_where_output_says(take_views, tmp_path):
     with pytest.raises(UserError, match=r"wrote 0 of 3 renders, '00000_rgb\.png' is not there"):
         list(load(output="sub/{name}_rgb.png").render(tmp_path / "m", views.cameras))
     assert len(list(load(output="{index:05d}.png").render(tmp_path / "m", views.cameras))) == 3
+
+
+def test_renders_in_the_model_folder_are_this_run_s(take_views, tmp_path):
+    """The 3DGS authors' render.py writes beside its model, under the number of iterations."""
+    views = take_views()
+    code = (
+        "import pathlib, shutil, sys; place = pathlib.Path('test', 'ours_' + sys.argv[2]); place.mkdir(parents=True)\n"
+        "for file in sorted(pathlib.Path(sys.argv[1], 'images').iterdir()): shutil.copy(file, place)"
+    )
+    shape = {
+        "render": [*python(code), "{cameras}", "{iterations}"],
+        "output": "{out}/test/ours_{iterations}/{name}.png",
+    }
+    train(load(**shape), views, tmp_path / "m", Budget(iterations=2))
+    assert len(list(load(**shape).render(tmp_path / "m", views.cameras[:2]))) == 2
+    shape["render"] = [sys.executable, "-c", "pass"]
+    with pytest.raises(UserError, match="wrote 0 of 2 renders"):
+        list(load(**shape).render(tmp_path / "m", views.cameras[:2]))
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_a_ply_of_gaussians_needs_no_renderer(take_views, tmp_path, degree):
+    views, script = take_views(), tmp_path / "splat.py"
+    script.write_text(
+        "import sys; import numpy as np; from viewbench.backends import _gaussian_ply as g\n"
+        "one = lambda *shape: np.ones((5, *shape), np.float32)\n"
+        f"shn = np.zeros((5, {(degree + 1) ** 2 - 1}, 3), np.float32)\n"
+        "place = one(3) * np.array(sys.argv[2:], np.float32)\n"
+        "g.save(sys.argv[1], g.Gaussians(place, 0 * one(3), one(4), 9 * one(), one(3), shn))\n"
+    )
+    before = (views.cameras.positions[0] + 3 * views.cameras.forward[0]).astype(str).tolist()
+    backend = load(train=[sys.executable, str(script), "splat.ply", *before], render=[], output="splat.ply")
+    assert backend.available() is None
+    train(backend, views, tmp_path / "m")
+    if degree > 1 and Gsplat().available():
+        with pytest.raises(UserError, match=r"harmonics of degree 2, .* train with degree 1"):
+            list(backend.render(tmp_path / "m", views.cameras))
+        return
+    image = next(iter(backend.render(tmp_path / "m", views.cameras[:1])))
+    assert (image.shape, image.dtype) == ((48, 48, 3), np.float32)
+    assert image.max() == pytest.approx(0.5 + 0.2820948, abs=0.02), "the constant band of one, on black"
 
 
 def test_the_section_is_read_from_environment_toml(tmp_path):

@@ -13,14 +13,15 @@ def command(folder: Path, only: str | None, page: bool) -> None:
     """Draw the reports of the study in FOLDER (results/STUDY) and put them into reports/index.html."""
     from viewbench.common.errors import UserError
     from viewbench.common.files import read_json
-    from viewbench.reports import _run
+    from viewbench.reports._run import page as put_together
+    from viewbench.reports._run import run as draw
 
     if not (folder / "results.csv").is_file():
         raise UserError(f"'{folder}' has no results.csv; give the folder of a study, such as results/quick")
     if not page:
         names = [only] if only else read_json(folder / "study.json", "study")["reports"]
         for name in names:
-            _run.run(folder, name)
+            draw(folder, name)
     if not only:
-        _run.page(folder)
+        put_together(folder)
         click.echo(folder / "reports" / "index.html")

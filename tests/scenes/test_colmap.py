@@ -1,0 +1,123 @@
+"""COLMAP models: what is read, and that pycolmap opens what is written."""
+
+import numpy as np
+import pycolmap
+import pytest
+from PIL import Image
+
+from viewbench.common import settings as settings_file
+from viewbench.common.errors import UserError
+from viewbench.scenes.load import open_scene
+from viewbench.scenes.subset import write_scene, write_subset
+
+SETTINGS = settings_file.load()
+NAMES = ["frame10.png", "frame2.png", "sub/frame1.png", "frame3.png"]
+
+
+@pytest.fixture(params=["bin", "txt"])
+def model(tmp_path, request):
+    """Four images and three points, seen by frames 10, 2 and 3, by 10 and 1, and by 2 and 3."""
+    made = pycolmap.Reconstruction()
+    camera = pycolmap.Camera(model="PINHOLE", width=12, height=8, params=[10, 11, 6, 4], camera_id=1)
+    made.add_camera_with_trivial_rig(camera)
+    tracks = {0: (1, 2, 4), 1: (1, 3), 2: (2, 4)}
+    seen = {image: [p for p, images in tracks.items() if image in images] for image in range(1, 5)}
+    for number, name in enumerate(NAMES, start=1):
+        image = pycolmap.Image(name=name, camera_id=1, image_id=number)
+        image.points2D = [pycolmap.Point2D(np.array([1.0 + p, 2.0])) for p in seen[number]]
+        pose = pycolmap.Rigid3d(pycolmap.Rotation3d(np.array([0, 0, 0, 1.0])), np.array([-number, 0, 0.0]))
+        made.add_image_with_trivial_frame(image, pose)
+        path = tmp_path / "images" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Image.new("RGB", (12, 8), (number, 0, 0)).save(path)
+    for point, images in tracks.items():
+        track = pycolmap.Track()
+        for image in images:
+            track.add_element(image, seen[image].index(point))
+        made.add_point3D(np.array([point, 1.0, 5.0]), track, np.array([10 * point, 0, 0], np.uint8))
+    folder = tmp_path / "sparse" / "0"
+    folder.mkdir(parents=True)
+    made.write_binary(folder) if request.param == "bin" else made.write_text(folder)
+    return tmp_path
+
+
+def opened(folder, **options):
+    return open_scene(str(folder), SETTINGS, **options)
+
+
+def test_frames_come_in_natural_order_with_poses_and_tracks(model):
+    scene = opened(model)
+    assert scene.format == "colmap"
+    assert scene.train.names == ("frame2.png", "frame3.png", "frame10.png", "sub/frame1.png")
+    cameras = scene.train.cameras
+    # the camera of image k stands at x = k and looks along world z with y down: OpenGL's -z back, y up
+    np.testing.assert_allclose(cameras.positions[:, 0], [2, 4, 1, 3], atol=1e-12)
+    np.testing.assert_allclose(cameras.forward, [[0, 0, 1]] * 4, atol=1e-12)
+    np.testing.assert_allclose(cameras.rotations[0], np.diag([1, -1, -1]), atol=1e-12)
+    assert (cameras.fx[0], cameras.fy[0], cameras.width[0], cameras.height[0]) == (10, 11, 12, 8)
+    by_place = {tuple(xyz): seen.tolist() for xyz, seen in zip(scene.points.xyz, scene.points.seen_by, strict=True)}
+    assert by_place == {(0, 1, 5): [0, 1, 2], (1, 1, 5): [2, 3], (2, 1, 5): [0, 1]}
+
+
+def test_holding_out_renumbers_the_tracks(model):
+    scene = opened(model, holdout="every:2")
+    assert scene.train.names == ("frame3.png", "sub/frame1.png")
+    by_place = {tuple(xyz): seen.tolist() for xyz, seen in zip(scene.points.xyz, scene.points.seen_by, strict=True)}
+    assert by_place == {(0, 1, 5): [0], (1, 1, 5): [1], (2, 1, 5): [0]}
+
+
+def test_pycolmap_opens_the_subset(model, tmp_path):
+    scene = opened(model)
+    write_subset(scene, {"indices": [1, 0]}, tmp_path / "out")
+    read = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
+    assert read.is_valid()
+    assert sorted(image.name for image in read.images.values()) == ["frame2.png", "frame3.png"]
+    # the second point was seen by none of the two
+    assert sorted(point.xyz[0] for point in read.points3D.values()) == [0, 2]
+    for point in read.points3D.values():
+        assert {read.images[e.image_id].name for e in point.track.elements} == {"frame2.png", "frame3.png"}
+    again = opened(tmp_path / "out")
+    assert again.train.names == ("frame2.png", "frame3.png")
+    np.testing.assert_allclose(again.train.cameras.c2w, scene.train.cameras.c2w[:2], atol=1e-12)
+    assert all(path.is_file() for path in again.train.paths)
+
+
+def test_the_test_split_stays_the_test_split(model, tmp_path):
+    scene = opened(model, holdout="every:2")
+    write_subset(scene, {"indices": [0]}, tmp_path / "out")
+    again = opened(tmp_path / "out")
+    assert (again.train.names, again.test.names) == (("frame3.png",), scene.test.names)
+
+
+def test_both_ways_between_the_formats(model, small_room, tmp_path):
+    room = opened(small_room)
+    write_scene(room, np.arange(12), tmp_path / "colmap", "colmap")
+    read = opened(tmp_path / "colmap")
+    assert set(read.train.names) == set(room.train.names)
+    order = [read.train.names.index(name) for name in room.train.names]
+    np.testing.assert_allclose(read.train.cameras.c2w[order], room.train.cameras.c2w, atol=1e-9)
+    np.testing.assert_allclose(sorted(read.points.xyz.tolist()), sorted(room.points.xyz.tolist()))
+    write_scene(read, np.arange(12), tmp_path / "back", "transforms")
+    back = opened(tmp_path / "back")
+    np.testing.assert_allclose(back.train.cameras.c2w, read.train.cameras.c2w, atol=1e-12)
+    assert len(back.test) == 4
+
+
+@pytest.mark.parametrize("name", ["images", "cameras", "points3D"])
+def test_a_broken_model_is_one_sentence(model, name):
+    for path in (model / "sparse" / "0").glob(f"{name}.*"):
+        path.write_bytes(b"1 not a model of anything\n1 2\n")
+    with pytest.raises(UserError, match="COLMAP"):
+        opened(model)
+
+
+def test_real_captures(data_root):
+    space = opened(data_root / "hololens_space")
+    assert len(space.train) == 373
+    assert len(space.points) == 34397
+    poses = np.loadtxt(data_root / "hololens_space" / "poses.txt").reshape(-1, 4, 4)
+    ours = space.train.cameras.c2w @ np.diag([1.0, -1, -1, 1])
+    np.testing.assert_allclose(ours, poses, atol=1e-4)
+    binary, text = opened(data_root / "real_room", format="colmap"), opened(data_root / "real_room")
+    assert len(binary.train) == 35
+    assert text.format in ("colmap", "transforms")

@@ -1,0 +1,68 @@
+"""log det where float64 ends, and the k-DPP sample."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from tests.selectors import slow
+from viewbench.common.errors import UserError
+from viewbench.selectors import _kdpp, logdet
+from viewbench.selectors._types import Views
+
+
+def repeated(n=40, distinct=10):
+    """Views of which only `distinct` differ: log det is −∞ for more."""
+    views = slow.random_views(np.random.default_rng(1), n=distinct)
+    some = np.arange(n) % distinct
+    return Views(views.positions[some], views.rotations[some], views.features[some])
+
+
+def test_all_views_are_answered_and_the_end_of_precision_is_said():
+    choice = logdet.select(repeated(), 40, np.random.default_rng(0))
+    assert sorted(choice.indices) == list(range(40))
+    assert choice.notes["below_precision_from"] == 10
+    assert len({i % 10 for i in choice.indices[:10]}) == 10
+    assert (choice.gains[10:] == np.log(choice.notes["precision"])).all()
+    assert np.isfinite(choice.gains).all()
+
+
+def test_gains_do_not_grow():
+    views = slow.random_views(np.random.default_rng(2), n=60)
+    for options in ({}, {"regularise": 0.1}):
+        gains = logdet.select(views, 60, np.random.default_rng(0), **options).gains
+        assert (np.diff(gains) <= 1e-9).all()
+
+
+def test_regularised_gains_are_positive_even_for_repetitions():
+    choice = logdet.select(repeated(), 40, np.random.default_rng(0), regularise=0.5)
+    assert "below_precision_from" not in choice.notes
+    assert (choice.gains > 0).all()
+
+
+def test_sample_has_the_probabilities_of_the_k_dpp():
+    views = slow.random_views(np.random.default_rng(5), n=6)
+    m = slow.matrix(views, sigma=3.0)
+    expected = slow.kdpp(m, 3)
+    rows = np.linalg.cholesky(m).T
+    rng, draws = np.random.default_rng(0), 8000
+    found = Counter(tuple(sorted(int(i) for i in _kdpp.sample(rows, 3, rng))) for _ in range(draws))
+    assert set(found) <= set(expected)
+    chi_squared = sum((found[s] - draws * p) ** 2 / (draws * p) for s, p in expected.items())
+    assert chi_squared < 45  # 19 degrees of freedom: exceeded once in 1,500 by a right sampler
+
+
+def test_sample_is_seeded_and_answers_beyond_the_rank():
+    first, again, other = (logdet.select(repeated(), 8, np.random.default_rng(s), sample=True) for s in (0, 0, 1))
+    assert first.indices.tolist() == again.indices.tolist() != other.indices.tolist()
+    assert len({i % 10 for i in first.indices}) == 8, "a k-DPP never draws two equal views"
+    assert first.gains is None
+    many = logdet.select(repeated(), 25, np.random.default_rng(0), sample=True)
+    assert len(set(many.indices.tolist())) == 25
+    assert many.notes["below_precision_from"] == 10
+
+
+@pytest.mark.parametrize("options", [{"regularise": -1.0}, {"regularise": 0.1, "sample": True}])
+def test_bad_options(options):
+    with pytest.raises(UserError):
+        logdet.select(repeated(), 5, np.random.default_rng(0), **options)
