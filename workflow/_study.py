@@ -211,8 +211,8 @@ def _known(kind: str, package: str, name: str, path: Path) -> None:
 
 def _explain(error: Any, schema: dict) -> str:
     """One sentence for a schema error; a wrong key is answered with the nearest right one."""
-    while error.context:  # anyOf: the branch that failed deepest is the one that was meant
-        error = max(error.context, key=lambda inner: len(inner.absolute_path))
+    while error.context:  # anyOf: the branch that failed deepest, or has a wrong key, is the one that was meant
+        error = max(error.context, key=lambda inner: (len(inner.absolute_path), inner.validator != "type"))
     where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error.absolute_path).lstrip(".")
     if error.validator == "additionalProperties":
         known = list(error.schema.get("properties", {}))

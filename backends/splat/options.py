@@ -8,22 +8,22 @@ from typing import Any
 class Options:
     """Hyperparameters; rates are per step, those of positions times the cameras' extent."""
 
-    gaussians: int = 12000  # most primitives; scene points beyond it are sampled
+    gaussians: int = 20000  # most primitives; scene points beyond it are sampled
     points: str = "auto"  # where they start: auto, scene, selected, rays
     degree: int = 1  # of spherical harmonics
-    opacity: float = 0.5  # at the start
+    opacity: float = 0.8  # at the start
     scale: float = 0.6  # at the start, times the spacing of the points
-    rate_mean: float = 6e-4
+    rate_mean: float = 1e-3
     rate_mean_end: float = 0.01  # share of rate_mean that is left at the end
     rate_scale: float = 0.02
     rate_quaternion: float = 2e-3
-    rate_opacity: float = 0.05
-    rate_colour: float = 5e-3
-    rate_sh: float = 1e-3
-    rate_end: float = 1.0  # share of the other rates that is left at the end
+    rate_opacity: float = 0.025
+    rate_colour: float = 7e-3
+    rate_sh: float = 3e-3
+    rate_end: float = 0.3  # share of the other rates that is left at the end
     ssim: float = 0.2
-    opacity_weight: float = 0.001
-    scale_weight: float = 0.0003
+    opacity_weight: float = 0.0
+    scale_weight: float = 0.0
     relocate_every: int = 100
     relocate_until: float = 0.85  # share of the budget
     near: float = 0.05  # near plane, share of the cameras' extent

@@ -1,6 +1,7 @@
 """Views of the generated room as backends get them, and a configured external program."""
 
 import json
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,7 @@ from viewbench.scenes.types import Cameras, Points
 
 ROOM = PACKAGE / "scenes" / "generated_room" / "human"
 NEAREST = Path(__file__).with_name("nearest_view.py")
+PYNGP = Path(__file__).with_name("pyngp_standin.py")
 
 
 def nearest_command(**changes: object) -> Command:
@@ -37,10 +39,11 @@ def settings_with(**commands: Command) -> Settings:
     return Settings(source=Path("environment.toml"), command=commands)
 
 
-@pytest.fixture(scope="session")
-def nearest() -> Settings:
-    """Settings that know `command:nearest`."""
-    return settings_with(nearest=nearest_command())
+def make_checkout(folder: Path) -> Path:
+    """A folder like a checkout of instant-ngp that has been built, with the stand-in for its module."""
+    (folder / "build").mkdir(parents=True)
+    shutil.copy(PYNGP, folder / "build" / "pyngp.py")
+    return folder
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,6 @@
 """A program of its own that "trains" by keeping views and renders the nearest one: the smallest external trainer.
 
-    nearest_view.py train --scene FOLDER --out FOLDER --seed N --iterations N
+    nearest_view.py train --scene FOLDER --out FOLDER --seed N --iterations N [--pause SECONDS]
     nearest_view.py render --model FOLDER --cameras FOLDER --images FOLDER
 
 It knows nothing of viewbench: it reads transforms.json as nerfstudio and instant-ngp write it.
@@ -10,14 +10,15 @@ import argparse
 import json
 import random
 import shutil
+import time
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 
-def train(scene: Path, out: Path, seed: int, iterations: int) -> None:
-    """Keeps as many views as there are iterations, in an order drawn from the seed."""
+def train(scene: Path, out: Path, seed: int, iterations: int, pause: float) -> None:
+    """Keeps as many views as there are iterations, in an order drawn from the seed; dawdles `pause` seconds a view."""
     transforms = json.loads((scene / "transforms.json").read_text(encoding="utf-8"))
     frames = transforms["frames"]
     random.Random(seed).shuffle(frames)
@@ -27,6 +28,7 @@ def train(scene: Path, out: Path, seed: int, iterations: int) -> None:
         kept = f"views/{number}.png"
         shutil.copy(scene / frame["file_path"], out / kept)
         frame["file_path"] = kept
+        time.sleep(pause)
     (out / "model.json").write_text(json.dumps(transforms), encoding="utf-8")
     print(f"kept {len(transforms['frames'])} views with seed {seed}")
 
@@ -54,6 +56,7 @@ def main() -> None:
         training.add_argument(f"--{name}", type=Path, required=True)
     for name in ("seed", "iterations"):
         training.add_argument(f"--{name}", type=int, required=True)
+    training.add_argument("--pause", type=float, default=0.0)
     for name in ("model", "cameras", "images"):
         rendering.add_argument(f"--{name}", type=Path, required=True)
     arguments = vars(parser.parse_args())

@@ -1,49 +1,70 @@
-"""What every backend promises: one suite over all that can run here, the configured nearest-view program among them."""
+"""What every backend promises: one suite over all that can run here.
+
+The configured nearest-view program is among them, and instant-ngp's adapter with a stand-in for its compiled module.
+"""
 
 import json
 import shutil
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.backends.conftest import nearest_command, settings_with
+from tests.backends.conftest import make_checkout, nearest_command, settings_with
 from viewbench.backends import _registry
 from viewbench.backends._psnr import psnr_db
 from viewbench.backends._train import WORK, train
 from viewbench.backends._types import Budget
-from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
-from viewbench.common.settings import Settings
+from viewbench.common.settings import InstantNgp, Settings
 from viewbench.scenes.images import load_images
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.types import Scene
 
-SETTINGS = settings_with(nearest=nearest_command())
+PROGRAMS = settings_with(nearest=nearest_command())
 WIDTH = 48
 ENOUGH = 400  # steps in which three small views are learnt
 
 
-@pytest.fixture(params=_registry.names(SETTINGS))
-def name(request):
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory) -> Settings:
+    """Settings in which everything is configured that can be."""
+    checkout = make_checkout(tmp_path_factory.mktemp("external") / "instant-ngp")
+    return replace(PROGRAMS, instant_ngp=InstantNgp(path=str(checkout)))
+
+
+@pytest.fixture(params=_registry.names(PROGRAMS))
+def name(request, settings):
     """A backend that can run here."""
-    reason = _registry.load(request.param, SETTINGS).available()
+    reason = _registry.load(request.param, settings).available()
     if reason:
         pytest.skip(f"{request.param}: {reason}")
     return request.param
 
 
 @pytest.fixture
-def backend(name):
-    return _registry.load(name, SETTINGS)
+def backend(name, settings):
+    return _registry.load(name, settings)
 
 
 @pytest.fixture
-def scene(small_room) -> Scene:
-    return open_scene(str(small_room), SETTINGS)
+def scene(small_room, settings) -> Scene:
+    return open_scene(str(small_room), settings)
+
+
+@pytest.fixture
+def train_cell(settings):
+    """Trains three views of a scene for a few steps."""
+
+    def run(scene: Scene, name: str, out: Path, budget: Budget | None = None, **more) -> dict:
+        arguments = {"settings": settings, "seed": 0, "width": WIDTH, "curve": False, **more}
+        return train(scene, selection_of(scene), name, out, budget=budget or Budget(iterations=20), **arguments)
+
+    return run
 
 
 def selection_of(scene: Scene, indices: tuple[int, ...] = (0, 4, 8)) -> dict:
@@ -51,12 +72,7 @@ def selection_of(scene: Scene, indices: tuple[int, ...] = (0, 4, 8)) -> dict:
     return {"indices": list(indices), "names": names, "n_views": len(scene.train), "selector": "random", "seed": 0}
 
 
-def train_cell(scene: Scene, name: str, out: Path, budget: Budget | None = None, **more) -> dict:
-    arguments = {"settings": SETTINGS, "seed": 0, "width": WIDTH, "curve": False, **more}
-    return train(scene, selection_of(scene), name, out, budget=budget or Budget(iterations=20), **arguments)
-
-
-def test_three_views_are_learnt(scene, name, backend, tmp_path):
+def test_three_views_are_learnt(scene, name, backend, tmp_path, train_cell):
     record = train_cell(scene, name, tmp_path / "m", Budget(iterations=ENOUGH))
     views, cameras = load_images(scene.train, np.array([0, 4, 8]), WIDTH)
     for render, view in zip(backend.render(tmp_path / "m", cameras), views, strict=True):
@@ -67,7 +83,7 @@ def test_three_views_are_learnt(scene, name, backend, tmp_path):
     assert record["version"]
 
 
-def test_renders_have_the_size_of_their_cameras_and_colours_between_0_and_1(scene, name, backend, tmp_path):
+def test_renders_have_the_size_of_their_cameras_and_colours_between_0_and_1(scene, name, backend, tmp_path, train_cell):
     train_cell(scene, name, tmp_path / "m")
     for width in (20, 64):
         cameras = scene.test.cameras.scaled(width)
@@ -78,7 +94,7 @@ def test_renders_have_the_size_of_their_cameras_and_colours_between_0_and_1(scen
             assert 0 <= image.min() <= image.max() <= 1
 
 
-def test_same_seed_same_model(scene, name, backend, tmp_path):
+def test_same_seed_same_model(scene, name, backend, tmp_path, train_cell):
     if not backend.CAPABILITIES.deterministic and name != "command:nearest":
         pytest.skip(f"{name} does not promise it")
     renders = []
@@ -89,7 +105,7 @@ def test_same_seed_same_model(scene, name, backend, tmp_path):
 
 
 @pytest.mark.parametrize("limit", ["iterations", "seconds"])
-def test_budget_is_obeyed_or_refused(scene, name, backend, tmp_path, limit):
+def test_budget_is_obeyed_or_refused(scene, name, backend, tmp_path, limit, train_cell):
     if getattr(backend.CAPABILITIES, limit):
         limits = {"iterations": 10**7, limit: {"iterations": 7, "seconds": 0.5}[limit]}
         record = train_cell(scene, name, tmp_path / "m", Budget(**limits))
@@ -101,69 +117,65 @@ def test_budget_is_obeyed_or_refused(scene, name, backend, tmp_path, limit):
         assert not (tmp_path / "m").exists()
 
 
-def test_impossible_requests_are_refused_in_one_line(scene, name, tmp_path):
+def test_impossible_requests_are_refused_in_one_line(scene, name, backend, tmp_path, train_cell, settings):
     wrong = selection_of(scene)
     wrong["indices"] = [0, 4, len(scene.train)]
-    requests = {
-        "has no option 'itterations'": {"options": {"itterations": 3}},
-        "expected something like": {"options": {"points": 3}},
-        "points": {"options": {"points": "nowhere"}},
-    }
-    for message, request in requests.items():
+    requests = {"has no option 'itterations'": {"itterations": 3}}
+    if "points" in backend.CAPABILITIES.options:
+        requests |= {"expected something like": {"points": 3}, "nowhere": {"points": "nowhere"}}
+    for message, options in requests.items():
         with pytest.raises(UserError, match=message) as caught:
-            train_cell(scene, name, tmp_path / "m", **request)
+            train_cell(scene, name, tmp_path / "m", options=options)
         assert "\n" not in str(caught.value)
     with pytest.raises(UserError, match="distinct and in"):
-        train(scene, wrong, name, tmp_path / "m", settings=SETTINGS, seed=0, budget=Budget(iterations=3), width=WIDTH)
+        train(scene, wrong, name, tmp_path / "m", settings=settings, seed=0, budget=Budget(iterations=3), width=WIDTH)
     assert not (tmp_path / "m" / "train.json").exists()
     assert not (tmp_path / "m" / WORK).exists()
 
 
-def test_no_test_image_is_read_while_training(small_room, name, tmp_path):
+def test_no_test_image_is_read_while_training(small_room, name, tmp_path, train_cell, settings):
     room = tmp_path / "room"
     shutil.copytree(small_room, room)
     for file in (room / "test").iterdir():
         file.write_bytes(b"garbage")
-    scene = open_scene(str(room), SETTINGS)
+    scene = open_scene(str(room), settings)
     assert train_cell(scene, name, tmp_path / "m")["iterations"] > 0
     with pytest.raises(UserError, match="cannot be read"):
         train_cell(scene, name, tmp_path / "n", curve=True)  # the curve, which is scored on test views, does read them
 
 
-def test_a_killed_run_leaves_nothing_half_written(small_room, scene, name, tmp_path):
+def test_a_killed_run_leaves_nothing_half_written(small_room, scene, name, tmp_path, settings):
     (tmp_path / "selection.json").write_text(json.dumps(selection_of(scene)))
-    settings = write_settings(tmp_path / "environment.toml", SETTINGS)
-    assert _registry.names(settings_file.load(settings)) == _registry.names(SETTINGS)
+    slow = nearest_command()
+    slow.train.extend(["--pause", "30"])
     command = [sys.executable, "-m", "viewbench", "train", str(small_room), "--backend", name]
     command += ["--selection", str(tmp_path / "selection.json"), "--width", str(WIDTH), "--out", str(tmp_path / "m")]
-    environment = {"VIEWBENCH_ENVIRONMENT": str(settings), "PATH": str(Path(sys.executable).parent)}
-    assert killed_in_the_middle([*command, "--iterations", "100000"], tmp_path / "m", environment)
+
+    def start(iterations: int, configured: Settings) -> subprocess.Popen:
+        file = write_settings(tmp_path / "environment.toml", configured)
+        environment = {"VIEWBENCH_ENVIRONMENT": str(file), "PATH": str(Path(sys.executable).parent)}
+        return subprocess.Popen(
+            [*command, "--iterations", str(iterations)], env=environment, stderr=subprocess.PIPE, text=True
+        )
+
+    killed = start(10**6, replace(settings, command={"nearest": slow}))
+    while not (tmp_path / "m" / WORK / "model").is_dir():
+        assert killed.poll() is None, killed.communicate()[1]
+        time.sleep(0.01)
+    time.sleep(0.5)
+    killed.kill()
+    killed.communicate()
     assert [path.name for path in (tmp_path / "m").iterdir()] == [WORK]
-    done = subprocess.run([*command, "--iterations", "5"], env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    again = start(5, settings)
+    _, said = again.communicate()
+    assert again.returncode == 0, said
     assert (tmp_path / "m" / "train.json").is_file()
     assert not (tmp_path / "m" / WORK).exists()
 
 
-def killed_in_the_middle(command: list[str], out: Path, environment: dict[str, str]) -> bool:
-    """Kills the command as soon as its work is on disk; again where it was faster, which a small program may be."""
-    for _ in range(5):
-        shutil.rmtree(out, ignore_errors=True)
-        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        while process.poll() is None and not any((out / WORK / "model").glob("*")):
-            if (out / WORK / "model").is_dir() and "command" not in " ".join(command):
-                time.sleep(1)  # a trainer in this process writes its model at the end
-                break
-            time.sleep(0.001)
-        process.kill()
-        if process.wait() != 0:
-            return True
-    return False
-
-
 def write_settings(path: Path, settings: Settings) -> Path:
     """The configured programs as an environment.toml."""
-    sections = []
+    sections = [f"[instant_ngp]\npath = {json.dumps(settings.instant_ngp.path)}\n"]
     for name, entry in settings.command.items():
         keys = "\n".join(f"{key} = {json.dumps(getattr(entry, key))}" for key in ("train", "render"))
         sections.append(f"[command.{name}]\n{keys}\n")

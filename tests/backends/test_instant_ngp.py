@@ -9,20 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.backends.conftest import make_checkout
 from viewbench.backends import _registry
 from viewbench.backends._types import Budget, Report
 from viewbench.common.errors import UserError
 from viewbench.common.settings import InstantNgp, Settings
 
-STAND_IN = Path(__file__).with_name("pyngp_standin.py")
-
 
 @pytest.fixture
 def checkout(tmp_path):
-    folder = tmp_path / "instant-ngp"
-    (folder / "build").mkdir(parents=True)
-    (folder / "build" / "pyngp.py").write_text(STAND_IN.read_text(encoding="utf-8"), encoding="utf-8")
-    return folder
+    return make_checkout(tmp_path / "instant-ngp")
 
 
 def load(path: object = "", python: str = ""):

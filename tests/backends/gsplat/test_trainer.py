@@ -175,3 +175,42 @@ def test_absent_cuda_is_explained():
     assert gsplat.Gsplat().version().startswith("gsplat 1.")
     with pytest.raises(UserError, match="install a CUDA toolkit"):
         gsplat.Gsplat().warm()
+
+
+def test_a_point_is_drawn_where_its_camera_sees_it(take_views):
+    views = take_views(width=40)
+    camera = dataclasses.replace(views.cameras[0], cx=np.array([17.0]), fy=views.cameras.fy[:1] * 1.2)
+    right, up, back = camera.rotations[0].T
+    point = camera.positions[0] - 2 * back + 0.3 * right + 0.4 * up
+    gaussians = trainer.starting(point[None], np.full((1, 3), 255), "default", 0, 0.01)
+    renderer = trainer.Renderer(real.rasterization, "cpu", "black", 0.0)
+    (image,) = renderer.images(renderer.parameters(gaussians), camera, 0)
+    weight = image.sum(axis=2)
+    v, u = np.mgrid[:40, :40] + 0.5
+    expected = 17 + camera.fx[0] * 0.3 / 2, camera.cy[0] - camera.fy[0] * 0.4 / 2
+    assert np.allclose([(weight * u).sum() / weight.sum(), (weight * v).sum() / weight.sum()], expected, atol=0.1)
+
+
+def test_models_look_the_same_in_the_cpu_backend(take_views, tmp_path):
+    from viewbench.backends.splat import ply
+    from viewbench.backends.splat.loop import draw
+
+    views = take_views(width=40)
+    points = views.points
+    gaussians = trainer.starting(points.xyz, points.rgb, "mcmc", 1, 1.0)
+    rng = np.random.default_rng(2)
+    bent = {"shn": 0.2, "quats": 0.5, "scales": 0.3}
+    gaussians = dataclasses.replace(
+        gaussians,
+        **{
+            name: (getattr(gaussians, name) + rng.normal(0, much, getattr(gaussians, name).shape)).astype(np.float32)
+            for name, much in bent.items()
+        },
+    )
+    _gaussian_ply.save(tmp_path / "model.ply", gaussians)
+    renderer = trainer.Renderer(real.rasterization, "cpu", "black", 0.0)
+    ours = draw(ply.read(tmp_path / "model.ply"), views.cameras, trainer.NEAR, 0.0, 1)
+    theirs = renderer.images(renderer.parameters(gaussians), views.cameras, 1)
+    for one, other in zip(ours, theirs, strict=True):
+        assert psnr_db(one, other) > 40
+        assert other.std() > 0.05
