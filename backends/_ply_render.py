@@ -1,7 +1,9 @@
 """Renders a PLY file of 3D Gaussians that some other program trained, with whichever of our rasterisers can."""
 
+import importlib
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -18,15 +20,11 @@ def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
 
     Raises UserError for a file that is no such PLY, and without a GPU for colours that the CPU rasteriser has not.
     """
-    from viewbench.backends.gsplat import Gsplat
-
     gaussians = _gaussian_ply.load(path)
-    gsplat = Gsplat()
+    gsplat = _module("gsplat").Gsplat()
     reason = gsplat.available()
     if reason is None:
-        from viewbench.backends.gsplat.trainer import Renderer
-
-        renderer = Renderer(gsplat.rasterizer(), gsplat.device, "black", NEAR)
+        renderer = _module("gsplat.renderer").Renderer(gsplat.rasterizer(), gsplat.device, "black", NEAR)
         yield from renderer.images(renderer.parameters(gaussians), cameras, gaussians.degree)
         return
     if gaussians.degree > CPU_DEGREE:
@@ -34,7 +32,10 @@ def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
             f"'{path}' has spherical harmonics of degree {gaussians.degree}, which the CPU rasteriser has not, and "
             f"gsplat is not available ({reason}); train with degree {CPU_DEGREE}"
         )
-    from viewbench.backends.splat import ply
-    from viewbench.backends.splat.loop import draw
+    model = _module("splat.ply").read(path)
+    yield from _module("splat.loop").draw(model, cameras, NEAR, 0.0, gaussians.degree)
 
-    yield from draw(ply.read(path), cameras, NEAR, 0.0, gaussians.degree)
+
+def _module(name: str) -> ModuleType:
+    """A module of this folder by name: an edit of a rasteriser is no reason to train another program's models again."""
+    return importlib.import_module(f"viewbench.backends.{name}")

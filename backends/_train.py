@@ -80,6 +80,8 @@ def train(
     try:
         trained = backend.train(data, work / "model", cell_seed, budget, options, report)
     except (UserError, MemoryError) as error:
+        for log in (work / "model").glob("*.log"):
+            log.replace(out / log.name)  # what an external program said outlives its failure
         shutil.rmtree(work, ignore_errors=True)
         if isinstance(error, MemoryError):
             raise UserError(f"backend '{backend_name}' ran out of memory with {len(indices)} views") from None

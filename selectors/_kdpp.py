@@ -6,16 +6,17 @@ from viewbench.selectors._cholesky import Residuals
 
 
 def sample(rows: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """(k,) indices for the kernel M = VᵀV given by its rows V (r, N), r ≥ k.
+    """(k,) indices for the kernel M = VᵀV given by its rows V (r, N); fewer where M has a smaller rank.
 
-    The eigenvectors of M come from those of V Vᵀ (r × r), so that the N × N matrix is not needed. k of them are drawn
+    The eigenvectors of M come from those of V Vᵀ (r × r), with r the numerical rank of M. k of them are drawn
     with probability proportional to the product of their eigenvalues λ, by the elementary symmetric polynomials
     e_k(λ_1 … λ_n); then one view after the other from the projection onto their span. O(N r k + r³) time.
     """
     values, vectors = np.linalg.eigh(rows @ rows.T)
-    values = np.maximum(values, np.finfo(float).tiny)  # as the authors clip: rounding makes some negative
+    trusted = values > len(values) * np.finfo(float).eps * values[-1]  # rounding makes others, some of them negative
+    values, vectors, count = values[trusted], vectors[:, trusted], min(count, int(trusted.sum()))
     kept = _eigenvectors(np.log(values), count, rng)
-    basis = (rows.T @ vectors[:, kept]) / np.sqrt(values[kept])  # (N, k), orthonormal columns
+    basis = np.linalg.qr(rows.T @ vectors[:, kept])[0]  # (N, k), orthonormal columns
     span = Residuals(lambda chosen: basis[chosen] @ basis.T, np.einsum("ij,ij->i", basis, basis), count)
     chosen = np.empty(count, dtype=np.int64)
     for k in range(count):

@@ -23,6 +23,7 @@ PARAMETERS = {
     "sample": False,
     "sharpness": 0.0,
 }
+MOST_TO_SAMPLE = 20_000  # views: a k-DPP looks at all eigenvectors of M, up to 3.2 GB of them
 
 
 def select(
@@ -50,12 +51,14 @@ def select(
     similar to those chosen is taken (the rule of `maxmin`), and the gain is reported as its bound, log N ε
     (log N ε (1 + λ) / λ with λ).
 
-    Raises UserError for a negative λ.
+    Raises UserError for a negative λ, and for a sample of more views than MOST_TO_SAMPLE.
     """
     if not 0 <= regularise < np.inf:
         raise UserError(f"regularise = {regularise} must be 0 or a positive number; it is λ in log det(I + M / λ)")
     if sample and regularise:
         raise UserError("'logdet' either samples or regularises; leave out one of the two")
+    if sample and len(views) > MOST_TO_SAMPLE:
+        raise UserError(f"'logdet' samples from at most {MOST_TO_SAMPLE} views, not {len(views)}; leave out 'sample'")
     begin = time.perf_counter()
     similar = similarity(views, alpha, beta, sigma, factors)
     prepared_s = time.perf_counter() - begin
@@ -111,11 +114,11 @@ def _greedy(
 
 
 def _sample(similar: Similarity, count: int, precision: float, rng: np.random.Generator) -> np.ndarray:
-    """A sample of the k-DPP, k lowered to the numerical rank of M where that is less than `count`."""
+    """A sample of the k-DPP, with k lowered to the numerical rank of M where that is less than `count`."""
     residuals = _kernel(similar, 0.0, len(similar))
     while residuals.size < len(similar) and residuals.left.max() > precision:
         residuals.add(int(residuals.left.argmax()))
-    return _kdpp.sample(residuals.rows, min(count, residuals.size), rng)
+    return _kdpp.sample(residuals.rows, count, rng)
 
 
 def _fill(similar: Similarity, indices: np.ndarray, count: int, prefer: Preference) -> np.ndarray:

@@ -1,13 +1,16 @@
 """Which files of viewbench a step depends on, so that editing one re-runs what it touches and nothing else.
 
 Snakemake sees only files. The sources of a step are the module that does it and, transitively, every viewbench module
-that one imports (at the top or inside a function). Plug-ins are loaded by name, so a step names those it uses.
+that one imports (at the top or inside a function). Plug-ins are loaded by name, so a step names those it uses. They
+are declared as one file that lists them with their hashes, rather than one by one: Snakemake looks at every input of
+every waiting job again and again, which with forty sources a job took half a core.
 """
 
 import ast
 import functools
 from pathlib import Path
 
+from viewbench.common.files import sha256_file, write_text
 from viewbench.common.settings import PACKAGE
 
 
@@ -27,6 +30,20 @@ def from_here(path: Path) -> str:
     """The path relative to the working folder where it is inside, so that a clone that moves is not run again."""
     here = Path.cwd()
     return str(path.relative_to(here) if path.is_relative_to(here) else path)
+
+
+def listing(path: Path, files: list[str]) -> str:
+    """Writes "hash  file" lines to `path` where they differ from what stands there, and returns the path."""
+    lines = (f"{_hash(name)}  {name}\n" for name in files)
+    text = "".join(lines)
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        write_text(path, text)
+    return str(path)
+
+
+@functools.cache
+def _hash(name: str) -> str:
+    return sha256_file(name)
 
 
 @functools.cache

@@ -5,6 +5,7 @@ import re
 import shlex
 from collections.abc import Iterator
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -16,7 +17,7 @@ from viewbench.common import plugins
 from viewbench.common.errors import UserError
 from viewbench.common.settings import PACKAGE, Settings
 from viewbench.reports._tracking import is_remote
-from viewbench.workflow._sources import from_here, sources
+from viewbench.workflow._sources import from_here, listing, sources
 from viewbench.workflow._study import Study
 
 
@@ -50,9 +51,9 @@ class Wiring:
         self.cells = CellSpace(pd.DataFrame(study.cells(), dtype=str))
         self._files: dict[str, list[str]] = {}
 
-    def sources(self, *modules: str) -> list[str]:
-        """Files that a step made of these modules depends on."""
-        return sources(*modules)
+    def sources(self, step: str, *modules: str, also: tuple[str, ...] = ()) -> str:
+        """The file that lists what a step made of these modules depends on, and the files `also`."""
+        return listing(Path(self.results) / "sources" / f"{step}.txt", [*sources(*modules), *also])
 
     @property
     def study_file(self) -> str:
@@ -72,8 +73,8 @@ class Wiring:
             with explained():
                 scene = open_scene(wildcards.scene, self.settings)
             images = [path for split in (scene.train, scene.test) for path in split.paths]
-            reader = sources(plugins.module_name("scenes.formats", scene.format).removeprefix("viewbench."))
-            self._files[wildcards.scene] = [*map(from_here, [*scene.files, *images]), *reader]
+            reader = self.sources(f"read-{scene.format}", _module("scenes.formats", scene.format))
+            self._files[wildcards.scene] = [*map(from_here, [*scene.files, *images]), reader]
         return self._files[wildcards.scene]
 
     @cached_property
@@ -87,7 +88,7 @@ class Wiring:
         """Module of the study's encoder."""
         family = self.study.encoder.split(":")[0]
         plugins.load("scenes.encoders", family)
-        return plugins.module_name("scenes.encoders", family).removeprefix("viewbench.")
+        return _module("scenes.encoders", family)
 
     def features(self, wildcards: Any) -> list[str]:
         """The scene's features, where the selector uses them."""
@@ -96,11 +97,10 @@ class Wiring:
             return []
         return [f"{self.results}/features/{wildcards.scene}.npy"]
 
-    def selector_sources(self, wildcards: Any) -> list[str]:
+    def selector_sources(self, wildcards: Any) -> str:
         """Files behind a selection."""
         selector = self.study.selector(wildcards.selector).selector
-        module = plugins.module_name("selectors", selector).removeprefix("viewbench.")
-        return sources("workflow.commands.select", module)
+        return self.sources(f"select-{selector}", "workflow.commands.select", _module("selectors", selector))
 
     def selector_options(self, wildcards: Any) -> str:
         """Options of `viewbench select` for the cell's selector."""
@@ -113,17 +113,18 @@ class Wiring:
             options += ["--encoder", "none"]
         return shlex.join(options)
 
-    def _backend_module(self, wildcards: Any) -> str:
-        family = self.study.backend(wildcards.backend).backend.split(":")[0]
-        return plugins.module_name("backends", family).removeprefix("viewbench.")
+    def _family(self, wildcards: Any) -> str:
+        return self.study.backend(wildcards.backend).backend.split(":")[0]
 
-    def backend_sources(self, wildcards: Any) -> list[str]:
+    def backend_sources(self, wildcards: Any) -> str:
         """Files behind a training run."""
-        return sources("workflow.commands.train", self._backend_module(wildcards))
+        family = self._family(wildcards)
+        return self.sources(f"train-{family}", "workflow.commands.train", _module("backends", family))
 
-    def warm_sources(self, wildcards: Any) -> list[str]:
+    def warm_sources(self, wildcards: Any) -> str:
         """Files behind a backend's compiled kernels."""
-        return sources("workflow.commands.warm", self._backend_module(wildcards))
+        family = self._family(wildcards)
+        return self.sources(f"warm-{family}", "workflow.commands.warm", _module("backends", family))
 
     def backend_options(self, wildcards: Any) -> str:
         """Options of `viewbench train` for the cell's backend."""
@@ -137,21 +138,28 @@ class Wiring:
         name = self.study.backend(wildcards.backend).backend
         return int(_registry.load(name, self.settings).CAPABILITIES.device == "cuda")
 
-    def report_sources(self, wildcards: Any) -> list[str]:
+    def report_sources(self, wildcards: Any) -> str:
         """Files behind a report: its module and the numbers that ship with it (`reports/NAME/*`)."""
-        module = plugins.module_name("reports", wildcards.report).removeprefix("viewbench.")
+        module = _module("reports", wildcards.report)
         data = PACKAGE.joinpath(*module.split("."))
-        return sources(module) + sorted(from_here(path) for path in data.rglob("*") if path.is_file())
+        files = sorted(from_here(path) for path in data.rglob("*") if path.is_file() and path.suffix != ".pyc")
+        return self.sources(f"report-{wildcards.report}", module, also=tuple(files))
 
     @property
-    def templates(self) -> list[str]:
-        """Files of the page's template."""
-        return sorted(from_here(path) for path in (PACKAGE / "reports" / "templates").iterdir() if path.is_file())
+    def page_sources(self) -> str:
+        """Files behind the page: its modules and its template."""
+        templates = (PACKAGE / "reports" / "templates").iterdir()
+        files = sorted(from_here(path) for path in templates if path.is_file())
+        return self.sources("page", "workflow.commands.report", "reports._page", also=tuple(files))
 
     @property
     def tracks_as_it_goes(self) -> bool:
         """Whether cells are logged one by one as they finish."""
         return is_remote(self.settings.tracking.uri)
+
+
+def _module(package: str, name: str) -> str:
+    return plugins.module_name(package, name).removeprefix("viewbench.")
 
 
 def _set_options(values: dict[str, Any]) -> list[str]:

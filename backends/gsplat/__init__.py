@@ -81,23 +81,22 @@ class Gsplat:
     ) -> Trained:
         """Trains on the chosen views and writes model.ply in the 3DGS authors' layout, and model.json.
 
-        Raises UserError for an unknown strategy, background or source of points, a degree of
-        spherical harmonics outside 0 to 3, and when the GPU's memory is full.
+        Raises UserError for an option out of its range, points that the scene does not have, and when the GPU's
+        memory is full.
         """
-        from viewbench.backends.gsplat.trainer import fit
+        from viewbench.backends.gsplat.trainer import Task, fit
 
         _check(options)
         rng = np.random.default_rng(seed)
         xyz, rgb, seeding = seed_points(data, options["points"], rng, options["random_points"])
-        gaussians, trained = fit(
-            data, xyz, rgb, seed, budget, options, report, device=self.device, rasterize=self.rasterizer()
-        )
+        task = Task(data, seed, budget, options, report)
+        gaussians, trained = fit(task, xyz, rgb, self.device, self.rasterizer())
         _gaussian_ply.save(out / MODEL, gaussians)
         write_json(out / RECORD, {"background": options["background"], "near": data.near})
         return Trained(seeding=seeding, **trained)
 
     def render(self, model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
-        from viewbench.backends.gsplat.trainer import Renderer
+        from viewbench.backends.gsplat.renderer import Renderer
 
         record = read_json(model / RECORD, "model record")
         gaussians = _gaussian_ply.load(model / MODEL)

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import importlib.util
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -43,14 +44,17 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
         raise UserError(f"open_clip has no model '{name}'{nearest(name, known)}; open_clip.list_models() has them all")
     if not tag:
         raise UserError(f"encoder 'open_clip:{argument}' names no weights; write open_clip:MODEL/TAG")
+    logging.disable(logging.CRITICAL)  # the hub logs every retry; what is wrong is said once, below
     try:
         model, _, _ = open_clip.create_model_and_transforms(name, pretrained=tag)
     except Exception as error:  # hubs fail in many ways: no network, no such file, no such tag
-        words = (str(error).splitlines() or [type(error).__name__])[0]
+        words = (str(error).splitlines() or [type(error).__name__])[0].split(". ")[0]
         raise UserError(
-            f"weights '{tag}' of open_clip's {name} are not in reach ({words[:160]}); "
+            f"weights '{tag}' of open_clip's {name} are not in reach ({words}); "
             "put them on disk and name the file, or use the encoder efficientnet-lite0"
         ) from None
+    finally:
+        logging.disable(logging.NOTSET)
     model.eval().to(device)
     settings = open_clip.get_model_preprocess_cfg(model)
     size = settings["size"] if isinstance(settings["size"], int) else int(settings["size"][0])

@@ -1,5 +1,6 @@
 """The `command` backend with a real program of its own, and with everything that can be wrong about one."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from viewbench.backends._types import Budget, Report
 from viewbench.backends.gsplat import Gsplat
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
+from viewbench.common.settings import PACKAGE
 
 OPTIONS = {"points": "scene"}
 TEN = Budget(iterations=10)
@@ -181,6 +183,19 @@ def test_a_ply_of_gaussians_needs_no_renderer(take_views, tmp_path, degree):
     image = next(iter(backend.render(tmp_path / "m", views.cameras[:1])))
     assert (image.shape, image.dtype) == ((48, 48, 3), np.float32)
     assert image.max() == pytest.approx(0.5 + 0.2820948, abs=0.02), "the constant band of one, on black"
+
+
+def test_the_examples_that_ship_are_well_formed(tmp_path):
+    lines = (PACKAGE / "environment.toml").read_text(encoding="utf-8").splitlines()
+    start = next(number for number, line in enumerate(lines) if line.startswith("# [command."))
+    text = [line.removeprefix("# ") for line in lines[start:]]
+    written = [line for line in text if re.match(r"""\[command\.|\w+ = |\s*"|#?$""", line)]
+    (tmp_path / "environment.toml").write_text("\n".join(written), encoding="utf-8")
+    settings = settings_file.load(tmp_path / "environment.toml")
+    assert set(settings.command) == {"3dgs", "splatfacto", "opensplat"}
+    for name in settings.command:
+        backend = _registry.load(f"command:{name}", settings)
+        assert (backend.CAPABILITIES.device, backend.CAPABILITIES.iterations) == ("cuda", True)
 
 
 def test_the_section_is_read_from_environment_toml(tmp_path):

@@ -144,6 +144,16 @@ def test_no_test_image_is_read_while_training(small_room, name, tmp_path, train_
         train_cell(scene, name, tmp_path / "n", curve=True)  # the curve, which is scored on test views, does read them
 
 
+def test_the_log_of_a_program_that_fails_is_kept(scene, tmp_path):
+    code = "print('reading'); print('cannot go on'); raise SystemExit(1)"
+    failing = settings_with(x=nearest_command(train=[sys.executable, "-c", code, "{iterations}"]))
+    arguments = {"settings": failing, "seed": 0, "budget": Budget(iterations=3), "width": WIDTH}
+    with pytest.raises(UserError, match="exit status 1: cannot go on"):
+        train(scene, selection_of(scene), "command:x", tmp_path / "m", **arguments)
+    (log,) = (tmp_path / "m").iterdir()
+    assert (log.name, log.read_text().split("\n")[0]) == ("command.log", "reading")
+
+
 def test_a_killed_run_leaves_nothing_half_written(small_room, scene, name, tmp_path, settings):
     (tmp_path / "selection.json").write_text(json.dumps(selection_of(scene)))
     slow = nearest_command()

@@ -5,6 +5,7 @@
 The slow versions are written from the paper: z_DF as three nested Python loops over the dense matrix M, z_CF summed
 anew over all regions and direction bins for each candidate, z_DPP by the determinant of each candidate set. Where the
 whole of one would take hours, part of it is timed and the column "slow by" says from which the total was computed.
+Timings mean something on a quiet machine with one thread a process (OMP_NUM_THREADS=1, as `make bench` sets it).
 Scale is measured in processes of their own, whose peak memory includes Python, the views and their features.
 """
 
@@ -171,8 +172,16 @@ def one(kind: str, selector: str, n: int, count: int, dims: int) -> None:
     begin = time.perf_counter()
     plugins.load("selectors", selector).select(views, count, np.random.default_rng(0))
     seconds = time.perf_counter() - begin
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-    print(json.dumps({"seconds": seconds, "peak_rss_bytes": peak}))
+    print(json.dumps({"seconds": seconds, "peak_rss_bytes": peak_rss_bytes()}))
+
+
+def peak_rss_bytes() -> int:
+    """Peak memory of this process alone; Linux's ru_maxrss starts from that of the process which started it."""
+    status = Path("/proc/self/status")
+    if status.is_file():
+        line = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
+        return int(line.split()[1]) * 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
 def help_seconds() -> float:

@@ -66,3 +66,11 @@ def test_sample_is_seeded_and_answers_beyond_the_rank():
 def test_bad_options(options):
     with pytest.raises(UserError):
         logdet.select(repeated(), 5, np.random.default_rng(0), **options)
+
+
+def test_sample_of_nearly_equal_views_is_distinct():
+    views = slow.random_views(np.random.default_rng(7), n=50)
+    close = Views(views.positions * 1e-4, np.repeat(views.rotations[:1], 50, axis=0), views.features)
+    choice = logdet.select(close, 50, np.random.default_rng(0), factors=["pos"], sample=True)
+    assert sorted(choice.indices) == list(range(50))
+    assert 3 <= choice.notes["below_precision_from"] < 50

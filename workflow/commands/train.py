@@ -57,4 +57,5 @@ def command(
         options=_options.settings_of(options),
         progress=_options.progress("train"),
     )
-    click.echo(f"{record['iterations']} iterations in {record['seconds']:.1f} s, {record['n_primitives']} primitives")
+    primitives = "" if record["n_primitives"] is None else f", {record['n_primitives']} primitives"
+    click.echo(f"{record['iterations']} iterations in {record['seconds']:.1f} s{primitives}")

@@ -52,7 +52,7 @@ rule evaluate:
     input:
         scene=f"{RESULTS}/scenes/{{scene}}.json",
         train=f"{CELL}/train.json",
-        sources=WIRING.sources("workflow.commands.evaluate"),
+        sources=WIRING.sources("evaluate", "workflow.commands.evaluate"),
     output:
         f"{CELL}/metrics.json",
     log:

@@ -9,7 +9,7 @@ rule collect:
         cells=METRICS,
         scenes=expand(f"{RESULTS}/scenes/{{scene}}.json", scene=STUDY.scenes),
         study=f"{RESULTS}/study.json",
-        sources=WIRING.sources("workflow.commands.collect"),
+        sources=WIRING.sources("collect", "workflow.commands.collect"),
     output:
         f"{RESULTS}/results.csv",
     log:
@@ -27,7 +27,7 @@ rule collect:
 rule track_cell:
     input:
         f"{CELL}/metrics.json",
-        WIRING.sources("workflow.commands.track"),
+        WIRING.sources("track", "workflow.commands.track"),
     output:
         f"{RESULTS}/tracked/{CELLS.wildcard_pattern}.json",
     log:
@@ -53,7 +53,7 @@ rule track:
             if WIRING.tracks_as_it_goes
             else []
         ),
-        sources=WIRING.sources("workflow.commands.track"),
+        sources=WIRING.sources("track", "workflow.commands.track"),
     output:
         f"{RESULTS}/tracked.json",
     log:
@@ -87,8 +87,7 @@ rule report:
 rule page:
     input:
         expand(f"{RESULTS}/reports/{{report}}.items.json", report=STUDY.reports),
-        WIRING.sources("workflow.commands.report", "reports._page"),
-        WIRING.templates,
+        WIRING.page_sources,
     output:
         f"{RESULTS}/reports/index.html",
     log:

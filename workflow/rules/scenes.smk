@@ -4,7 +4,7 @@
 rule study:
     input:
         WIRING.study_file,
-        WIRING.sources("workflow.commands.study"),
+        WIRING.sources("study", "workflow.commands.study"),
     output:
         f"{RESULTS}/study.json",
     log:
@@ -21,7 +21,7 @@ rule study:
 rule describe:
     input:
         scene=WIRING.scene_files,
-        sources=WIRING.sources("workflow.commands.describe"),
+        sources=WIRING.sources("describe", "workflow.commands.describe"),
     output:
         f"{RESULTS}/scenes/{{scene}}.json",
     log:
@@ -37,7 +37,9 @@ rule describe:
 rule features:
     input:
         scene=f"{RESULTS}/scenes/{{scene}}.json",
-        sources=WIRING.sources("workflow.commands.features", WIRING.encoder_module),
+        sources=WIRING.sources(
+            "features", "workflow.commands.features", WIRING.encoder_module
+        ),
     output:
         f"{RESULTS}/features/{{scene}}.npy",
     log:

@@ -14,7 +14,9 @@ from viewbench.common.errors import UserError
 torch = pytest.importorskip("torch")
 real = pytest.importorskip("gsplat", reason="gsplat is not installed (pip install 'viewbench[gpu]')")
 
-from viewbench.backends.gsplat import trainer  # noqa: E402 - it imports torch
+from viewbench.backends.gsplat import gaussians as gaussians_of  # noqa: E402 - these import torch
+from viewbench.backends.gsplat.densification import PAPER_STEPS, Densification  # noqa: E402
+from viewbench.backends.gsplat.renderer import NEAR, Renderer  # noqa: E402
 
 BACKEND = gsplat.Gsplat(device="cpu", rasterize=real.rasterization)
 OPTIONS = {**BACKEND.CAPABILITIES.options, "points": "random", "random_points": 150}
@@ -71,14 +73,15 @@ def test_growth_ends_at_the_cap(take_views, tmp_path):
 def test_opacities_are_reset_on_schedule(take_views):
     """gsplat 1.5.3 alone never resets them."""
     views = take_views(width=24)
-    params = trainer.parameters(
-        trainer.starting(np.random.default_rng(0).normal(size=(20, 3)), np.zeros((20, 3)), "default", 0, 1.0), "cpu"
+    params = gaussians_of.parameters(
+        gaussians_of.starting(np.random.default_rng(0).normal(size=(20, 3)), np.zeros((20, 3)), "default", 0, 1.0),
+        "cpu",
     )
-    optims = trainer.optimizers(params, 1.0)
-    densification = trainer.Densification(OPTIONS, params, optims, 1.0, 30_000)
+    optims = gaussians_of.optimizers(params, 1.0)
+    densification = Densification(OPTIONS, params, optims, 1.0, 30_000)
     with torch.no_grad():
         params["opacities"].fill_(5.0)
-    renderer = trainer.Renderer(real.rasterization, "cpu", "black", 0.0)
+    renderer = Renderer(real.rasterization, "cpu", "black", 0.0)
     for step, highest in ((2999, 0.99), (3000, 0.01)):
         image, info = renderer.render(params, views.cameras[0], 0)
         densification.before_backward(step, info)
@@ -89,15 +92,21 @@ def test_opacities_are_reset_on_schedule(take_views):
     assert optims["opacities"].param_groups[0]["params"][0] is params["opacities"]
 
 
+def test_a_run_that_loses_every_gaussian_says_so(take_views, tmp_path, monkeypatch):
+    monkeypatch.setitem(gaussians_of.STARTS, "default", (0.001, 1.0))  # below what is pruned
+    with pytest.raises(UserError, match="no Gaussian was opaque enough"):
+        train(take_views(width=24), tmp_path / "m", steps=100, cap=1)
+
+
 def test_the_schedule_is_squeezed_with_the_run():
-    params = trainer.parameters(trainer.starting(np.eye(3), np.zeros((3, 3)), "default", 0, 1.0), "cpu")
-    optims = trainer.optimizers(params, 1.0)
+    params = gaussians_of.parameters(gaussians_of.starting(np.eye(3), np.zeros((3, 3)), "default", 0, 1.0), "cpu")
+    optims = gaussians_of.optimizers(params, 1.0)
     for steps, start, every, stop in ((30_000, 500, 100, 15_000), (3000, 50, 10, 1500)):
-        strategy = trainer.Densification(OPTIONS, params, optims, 2.0, steps).strategy
+        strategy = Densification(OPTIONS, params, optims, 2.0, steps).strategy
         assert (strategy.refine_start_iter, strategy.refine_every, strategy.refine_stop_iter) == (start, every, stop)
-    state = trainer.Densification(OPTIONS, params, optims, 2.0, 3000).state
+    state = Densification(OPTIONS, params, optims, 2.0, 3000).state
     assert state["scene_scale"] == 2.0
-    assert "binoms" in trainer.Densification({**OPTIONS, "strategy": "mcmc"}, params, optims, 2.0, 3000).state
+    assert "binoms" in Densification({**OPTIONS, "strategy": "mcmc"}, params, optims, 2.0, 3000).state
 
 
 def test_same_seed_same_model_on_one_cpu_thread(take_views, tmp_path):
@@ -127,7 +136,7 @@ def test_curve_and_seconds_leave_the_probe_out(take_views, tmp_path):
 
 def test_seconds_end_a_run(take_views, tmp_path):
     trained = train(take_views(width=24), tmp_path / "m", budget=Budget(seconds=0.3), random_points=10)
-    assert 0 < trained.iterations < trainer.PAPER_STEPS
+    assert 0 < trained.iterations < PAPER_STEPS
 
 
 @pytest.mark.parametrize(("background", "level"), [("white", 1.0), ("black", 0.0)])
@@ -182,8 +191,8 @@ def test_a_point_is_drawn_where_its_camera_sees_it(take_views):
     camera = dataclasses.replace(views.cameras[0], cx=np.array([17.0]), fy=views.cameras.fy[:1] * 1.2)
     right, up, back = camera.rotations[0].T
     point = camera.positions[0] - 2 * back + 0.3 * right + 0.4 * up
-    gaussians = trainer.starting(point[None], np.full((1, 3), 255), "default", 0, 0.01)
-    renderer = trainer.Renderer(real.rasterization, "cpu", "black", 0.0)
+    gaussians = gaussians_of.starting(point[None], np.full((1, 3), 255), "default", 0, 0.01)
+    renderer = Renderer(real.rasterization, "cpu", "black", 0.0)
     (image,) = renderer.images(renderer.parameters(gaussians), camera, 0)
     weight = image.sum(axis=2)
     v, u = np.mgrid[:40, :40] + 0.5
@@ -197,7 +206,7 @@ def test_models_look_the_same_in_the_cpu_backend(take_views, tmp_path):
 
     views = take_views(width=40)
     points = views.points
-    gaussians = trainer.starting(points.xyz, points.rgb, "mcmc", 1, 1.0)
+    gaussians = gaussians_of.starting(points.xyz, points.rgb, "mcmc", 1, 1.0)
     rng = np.random.default_rng(2)
     bent = {"shn": 0.2, "quats": 0.5, "scales": 0.3}
     gaussians = dataclasses.replace(
@@ -208,8 +217,8 @@ def test_models_look_the_same_in_the_cpu_backend(take_views, tmp_path):
         },
     )
     _gaussian_ply.save(tmp_path / "model.ply", gaussians)
-    renderer = trainer.Renderer(real.rasterization, "cpu", "black", 0.0)
-    ours = draw(ply.read(tmp_path / "model.ply"), views.cameras, trainer.NEAR, 0.0, 1)
+    renderer = Renderer(real.rasterization, "cpu", "black", 0.0)
+    ours = draw(ply.read(tmp_path / "model.ply"), views.cameras, NEAR, 0.0, 1)
     theirs = renderer.images(renderer.parameters(gaussians), views.cameras, 1)
     for one, other in zip(ours, theirs, strict=True):
         assert psnr_db(one, other) > 40

@@ -1,0 +1,56 @@
+"""Calls gsplat's rasterization with our cameras, in training and afterwards."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import torch
+
+from viewbench.backends._gaussian_ply import Gaussians
+from viewbench.backends.gsplat.gaussians import Parameters, parameters
+from viewbench.scenes.types import Cameras
+
+NEAR = 0.01  # scene units, gsplat's own default
+BACKGROUNDS = {"black": 0.0, "white": 1.0}
+
+
+class Renderer:
+    """gsplat's rasterization on one device, over one background, from one near plane (scene units, 0: its default)."""
+
+    def __init__(self, rasterize: Callable, device: str, background: str, near: float):
+        self.rasterize, self.device = rasterize, device
+        self.background = torch.full((1, 3), BACKGROUNDS[background], device=device)
+        self.near = near or NEAR
+
+    def parameters(self, gaussians: Gaussians) -> Parameters:
+        """The Gaussians on the device."""
+        return parameters(gaussians, self.device)
+
+    def render(self, params: Parameters, camera: Cameras, degree: int) -> tuple[torch.Tensor, dict[str, Any]]:
+        """(H, W, 3) image of the first camera, not clamped, and what the strategies need to know of it."""
+        intrinsics = np.array([[camera.fx[0], 0, camera.cx[0]], [0, camera.fy[0], camera.cy[0]], [0, 0, 1]])
+        image, _, info = self.rasterize(
+            means=params["means"],
+            quats=params["quats"],
+            scales=params["scales"].exp(),
+            opacities=params["opacities"].sigmoid(),
+            colors=torch.cat([params["sh0"], params["shn"]], dim=1),
+            viewmats=self._tensor(camera.world_to_camera()[:1]),
+            Ks=self._tensor(intrinsics[None]),
+            width=int(camera.width[0]),
+            height=int(camera.height[0]),
+            near_plane=self.near,
+            sh_degree=degree,
+            packed=False,
+            backgrounds=self.background,
+        )
+        return image[0], info
+
+    @torch.no_grad()
+    def images(self, params: Parameters, cameras: Cameras, degree: int) -> Iterator[np.ndarray]:
+        """(H, W, 3) float32 in [0, 1], one for each camera."""
+        for camera in cameras:
+            yield self.render(params, camera, degree)[0].clamp(0, 1).cpu().numpy()
+
+    def _tensor(self, array: np.ndarray) -> torch.Tensor:
+        return torch.from_numpy(array).to(self.device, torch.float32)
