@@ -73,7 +73,7 @@ def _scores(scores: list[Score], title: str, name: str, out: Path) -> Item:
     scenes = in_order(score.scene for score in scores)
     rows = []
     for model in in_order(score.model for score in scores):
-        best: dict[str, float] = {}
+        best: dict[tuple[str, str], bool] = {}
         for scene in scenes:
             column = [score for score in scores if (score.model, score.scene) == (model, scene)]
             marks = _tables.best([score.psnr_db for score in column], 2)
