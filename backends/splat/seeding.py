@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from viewbench.backends._seeding import seen
 from viewbench.backends._types import TrainingSet
 from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, SH0, SH_C0, empty
 from viewbench.common.errors import UserError, nearest
@@ -32,10 +33,7 @@ def seed(
     if source in ("auto", "scene", "selected") and data.points is not None:
         use = np.flatnonzero(np.isfinite(data.points.xyz).all(axis=1))
         if source == "selected":
-            if data.points.seen_by is None:
-                raise UserError("points 'selected' needs tracks, which this scene's points do not have; use 'rays'")
-            chosen = set(data.chosen.tolist())
-            use = np.array([i for i in use if len(chosen.intersection(data.points.seen_by[i].tolist())) >= 2], int)
+            use = use[seen(data)[use]]
         if len(use) > count:
             use = np.sort(rng.choice(use, count, replace=False))
         points, colours = data.points.xyz[use], data.points.rgb[use] / 255
