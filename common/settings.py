@@ -29,7 +29,7 @@ class SceneEntry:
 class Features:
     encoder: str = "efficientnet-lite0"
     cache: str = "results/features"
-    batch: int = 16
+    batch: int = 4
 
 
 @dataclass(frozen=True)
