@@ -40,7 +40,7 @@ rule track_cell:
         "log {wildcards.scene}/{wildcards.selector}/{wildcards.ratio}/{wildcards.seed} to MLflow"
     shell:
         "viewbench track {params.study:q} --results {params.results:q} --cell {params.cell:q}"
-        " --stamp {output:q} 2> {log:q}"
+        " --stamp {output:q} > /dev/null 2> {log:q}"
 
 
 # A server gets every cell as it is finished; a database beside the results gets them all at once at the end, since
@@ -64,7 +64,7 @@ rule track:
     message:
         "log the cells to MLflow"
     shell:
-        "viewbench track {params.study:q} --results {params.results:q} --stamp {output:q} 2> {log:q}"
+        "viewbench track {params.study:q} --results {params.results:q} --stamp {output:q} > /dev/null 2> {log:q}"
 
 
 rule report:
