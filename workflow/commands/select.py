@@ -19,6 +19,9 @@ from viewbench.workflow.commands import _options
 @click.option("--beta", type=float, help="Weight of the rotation factor; 0.2. The semantic one gets the rest.")
 @click.option("--sigma", type=float, help="Width of the position factor, positions scaled to [-4, 4]; 0.5.")
 @click.option("--factors", help="Factors to use, of pos,ang,sem.")
+@click.option("--start", type=click.Choice(["random", "medoid"]), help="First view of maxmin and kcenter.")
+@click.option("--sample", is_flag=True, help="Draw logdet's views from the k-DPP instead of maximising.")
+@click.option("--sharpness", type=float, metavar="W", help="How much blurred frames lose; 0 ignores blur.")
 @click.option("--features", type=click.Path(path_type=Path), help="Your own N x D features (.npy).")
 @_options.encoder_option
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
@@ -48,13 +51,19 @@ def command(**given: Any) -> None:
     n = len(scene.train)
     count = given["count"] if given["ratio"] is None else _run.count_of(given["ratio"], n)
     parameters = _options.settings_of(given["options"])
-    parameters |= {key: given[key] for key in ("alpha", "beta", "sigma") if given[key] is not None}
+    named = ("alpha", "beta", "sigma", "start", "sharpness")
+    parameters |= {key: given[key] for key in named if given[key] is not None}
+    if given["sample"]:
+        parameters["sample"] = True
     if given["factors"] is not None:
         parameters["factors"] = [part.strip() for part in given["factors"].split(",") if part.strip()]
     if isinstance(parameters.get("factors"), str):
         parameters["factors"] = [parameters["factors"]]
     features = _features(scene, given, parameters, settings)
-    record = _run.run(scene, given["selector"], count, given["seed"], parameters, features)
+    sharp = _sharpness(scene, settings) if parameters.get("sharpness") else None
+    record = _run.run(scene, given["selector"], count, given["seed"], parameters, features, sharp)
+    for name, note in record.get("notes", {}).items():
+        click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
     if given["selection"]:
         write_json(given["selection"], record)
     if given["out"] and not given["dry_run"]:
@@ -88,4 +97,12 @@ def _features(scene: Any, given: dict[str, Any], parameters: dict[str, Any], set
     from viewbench.scenes.features import features
 
     cache = Path(settings.features.cache)
-    return features(scene.train, encoder, cache, settings.features.batch, _options.progress("features"))
+    progress = _options.progress("features")
+    return features(scene.train, encoder, cache, settings.features.batch, progress, settings.compute.device)
+
+
+def _sharpness(scene: Any, settings: Any) -> Any:
+    """How sharp each training image is, measured once and kept."""
+    from viewbench.scenes.sharpness import sharpness
+
+    return sharpness(scene.train, Path(settings.features.cache), _options.progress("sharpness"))
