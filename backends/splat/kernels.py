@@ -1,5 +1,6 @@
 """How every kernel of this backend is compiled, and the arithmetic that they share."""
 
+import hashlib
 import os
 from pathlib import Path
 from typing import Any
@@ -8,12 +9,15 @@ from typing import Any
 def _prepare() -> None:
     """Settings that numba reads when it is first imported, unless the user has made them.
 
-    Compiled kernels are kept in the user's cache folder, so that all jobs of a study share them; full-width vectors
-    are allowed, which numba by default avoids on processors that have them (a quarter of the speed).
+    Compiled kernels are kept in the user's cache folder, so that all jobs of a study share them. Its name has a hash
+    of this backend's sources: numba looks at the file of a kernel alone, and would keep one that inlines what another
+    file has changed. Full-width vectors are allowed, which numba by default avoids on processors that have them (a
+    quarter of the speed).
     """
     if "NUMBA_CACHE_DIR" not in os.environ:
         base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        os.environ["NUMBA_CACHE_DIR"] = str(base / "viewbench" / "numba")
+        sources = b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
+        os.environ["NUMBA_CACHE_DIR"] = str(base / "viewbench" / f"numba-{hashlib.sha256(sources).hexdigest()[:16]}")
     if "NUMBA_CPU_FEATURES" not in os.environ and "NUMBA_CPU_NAME" not in os.environ:
         try:
             import llvmlite.binding as llvm
