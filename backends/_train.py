@@ -52,6 +52,8 @@ def train(
         raise UserError(f"backend '{backend_name}' is not available: {reason}")
     options = _options(backend_name, backend.CAPABILITIES.options, options or {})
     _obeyed(backend_name, backend.CAPABILITIES, budget)
+    if not scene.posed:
+        raise UserError(f"'{scene.name}' has no poses to train with; run structure-from-motion (COLMAP) first")
     indices = check_selection(selection, scene)
     views = scene.train.subset(indices)
     images, cameras = load_images(scene.train, indices, width)

@@ -51,9 +51,10 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
 
 
 def detect(root: Path) -> str:
-    """Name of the format of the folder. Raises UserError when none knows it."""
-    for name in plugins.names(FORMATS):
-        if plugins.load(FORMATS, name).detect(root):
+    """Name of the format of the folder, one with poses where there is one. Raises UserError when none knows it."""
+    formats = {name: plugins.load(FORMATS, name) for name in plugins.names(FORMATS)}
+    for name in sorted(formats, key=lambda name: not getattr(formats[name], "POSED", True)):
+        if formats[name].detect(root):
             return name
     known = ", ".join(plugins.names(FORMATS))
     raise UserError(f"'{root}' is in no known format ({known}); see `viewbench list formats`, or force one by --format")

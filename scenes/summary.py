@@ -19,6 +19,7 @@ def summary(scene: Scene) -> dict[str, Any]:
         "training_views": len(scene.train),
         "test_views": len(scene.test),
         "test_split": scene.holdout,
+        "poses": scene.posed,
         "image_size": [f"{width} x {height}" for width, height in sizes],
         "focal_length": sorted({round(float(f), 2) for f in cameras.fx})[:5],
         "distorted": cameras.distortion is not None,

@@ -122,4 +122,5 @@ class Scene:
     holdout: str = "given"  # where the test split came from: "given" by the format, or the rule that made it
     files: tuple[Path, ...] = ()  # what was read besides the images
     notes: tuple[str, ...] = ()  # what the reader dropped or assumed, for people
+    posed: bool = True  # False for a folder of images or a video: poses are then the identity and mean nothing
     details: dict[str, Any] = field(default_factory=dict)

@@ -15,6 +15,8 @@ from viewbench.scenes.types import Scene, Split
 from viewbench.selectors._normalise import normalise
 from viewbench.selectors._types import Views
 
+PLAIN = ("random", "uniform", "full")  # selectors that compare nothing
+
 
 def count_of(ratio: float, n: int) -> int:
     """K = max(1, round(ratio · N)); halves go to the even number, as Python's `round` has it.
@@ -52,6 +54,8 @@ def run(
     plugin = plugins.load("selectors", selector)
     selector = selector.replace("_", "-")
     options = _options(selector, plugin.PARAMETERS, parameters or {})
+    if not scene.posed:
+        options = _without_poses(scene, selector, options, features)
     if options.get("sharpness") and sharpness is None:
         raise UserError(f"'{selector}' was asked to weigh sharpness, but the sharpness of the frames was not given")
     views = _views(scene.train, features, sharpness)
@@ -78,6 +82,25 @@ def run(
         "viewbench": __version__,
     }
     return record | ({"notes": dict(choice.notes)} if choice.notes else {})
+
+
+def _without_poses(scene: Scene, selector: str, options: dict[str, Any], features: np.ndarray | None) -> dict[str, Any]:
+    """The options for a capture that has no poses: image content is the only factor.
+
+    Raises UserError for a selector that needs poses, and for one that compares views when there are no features.
+    """
+    if selector not in PLAIN and (selector == "coverage" or ("factor" in options and options["factor"] != "sem")):
+        raise UserError(
+            f"'{selector}' compares poses, which '{scene.name}' does not have; use maxmin, logdet or uniform"
+        )
+    if "factors" not in options:
+        return options
+    if features is None:
+        raise UserError(
+            f"'{scene.name}' has no poses, so '{selector}' can compare image content only: "
+            "name an encoder or give --features, or use uniform"
+        )
+    return options | {"factors": ["sem"]}
 
 
 def _views(train: Split, features: np.ndarray | None, sharpness: np.ndarray | None) -> Views:

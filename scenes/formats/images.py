@@ -1,0 +1,95 @@
+"""A folder of images without poses, before any structure-from-motion: chosen by content, time and sharpness."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from viewbench.common.errors import UserError
+from viewbench.scenes.subset import place_image
+from viewbench.scenes.types import Cameras, Scene, Split
+
+WRITABLE = True
+POSED = False
+SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp"}
+
+
+def detect(root: Path) -> str | None:
+    """Why the folder is in this format, or None."""
+    found = _images(root)
+    return f"it has {len(found)} images and no poses" if len(found) >= 2 else None
+
+
+def _images(root: Path) -> list[Path]:
+    """The images in the folder itself or, where it has none, in its folder images/, in natural order."""
+    for folder in (root, root / "images"):
+        if folder.is_dir():
+            found = [path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file()]
+            if found:
+                return sorted(found, key=lambda path: natural(path.name))
+    return []
+
+
+def natural(name: str) -> list[tuple[int, int, str]]:
+    """Sorting key that puts frame2 before frame10."""
+    return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", name)]
+
+
+def read(root: Path) -> Scene:
+    """All images as training views, in natural order of their names, without times.
+
+    Raises UserError when there are fewer than two, when one is no image, and for images of different sizes.
+    """
+    paths = _images(root)
+    if len(paths) < 2:
+        raise UserError(f"'{root}' has {len(paths)} images; a capture has at least two")
+    sizes = np.array([_size(path) for path in paths], dtype=np.int64)
+    odd = np.flatnonzero((sizes != sizes[0]).any(axis=1))
+    if len(odd):
+        first, other = paths[0], paths[odd[0]]
+        raise UserError(
+            f"images have different sizes: '{first.name}' is {sizes[0][0]} x {sizes[0][1]}, "
+            f"'{other.name}' {sizes[odd[0]][0]} x {sizes[odd[0]][1]}; resize them or keep one size"
+        )
+    names = tuple(path.name for path in paths)
+    return unposed(root, "images", Split(names, tuple(paths), nominal_cameras(sizes)))
+
+
+def nominal_cameras(sizes: np.ndarray) -> Cameras:
+    """Cameras of (N, 2) sizes in pixels that stand at the origin and mean nothing but their sizes."""
+    width, height = sizes.T
+    poses = np.tile(np.eye(4), (len(sizes), 1, 1))
+    return Cameras(poses, width * 1.0, width * 1.0, width / 2, height / 2, width, height)
+
+
+def unposed(root: Path, name: str, frames: Split, files: tuple[Path, ...] = (), **details: object) -> Scene:
+    """A scene of frames whose poses are not known."""
+    note = "no poses: views are chosen by image content, time and sharpness"
+    return Scene(
+        name=root.stem,
+        root=root,
+        format=name,
+        train=frames,
+        test=frames.subset([]),
+        files=files,
+        notes=(note,),
+        posed=False,
+        details=details,
+    )
+
+
+def _size(path: Path) -> tuple[int, int]:
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            return image.size
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
+        raise UserError(f"image '{path}' cannot be read: {error}") from None
+
+
+def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
+    """Writes the chosen images to images/, and those held out, if any, to test/, under their own names."""
+    for folder, split in (("images", scene.train.subset(indices)), ("test", scene.test)):
+        for name, path in zip(split.names, split.paths, strict=True):
+            place_image(path, out / folder / Path(name).name, copy)

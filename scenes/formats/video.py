@@ -1,0 +1,92 @@
+"""A video file (by PyAV): frames chosen by content, time and sharpness, written with their original numbers."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewbench.common.errors import UserError
+from viewbench.common.files import read_json, sha256_file, whole_folder, write_json
+from viewbench.scenes.formats.images import nominal_cameras, unposed
+from viewbench.scenes.types import Scene, Split
+
+WRITABLE = True
+POSED = False
+SUFFIXES = {".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v"}
+SMALL = 384  # pixels of the longer side of the frames that features and sharpness are computed from
+
+
+def detect(root: Path) -> str | None:
+    """Why the file is in this format, or None."""
+    return f"it is a {root.suffix} file" if root.is_file() and root.suffix.lower() in SUFFIXES else None
+
+
+def read(root: Path) -> Scene:
+    """Every frame as a training view, named frame_000000 and so on, with its time in seconds.
+
+    The video is decoded once, frame by frame, into a cache of small pictures named by the file's content; what is in
+    memory is one frame. Raises UserError for a file that is no video, and when PyAV is not installed.
+    """
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "viewbench" / "video"
+    folder = base / f"{sha256_file(root)[:32]}-{SMALL}"
+    if not (folder / "frames.json").is_file():
+        with whole_folder(folder) as temporary:
+            times, size = _extract(root, temporary)
+            write_json(temporary / "frames.json", {"times": times, "size": size})
+    table = read_json(folder / "frames.json", "cached frames")
+    times = table["times"]
+    names = tuple(frame_name(number) for number in range(len(times)))
+    paths = tuple(folder / f"{name}.jpg" for name in names)
+    sizes = np.tile(np.array(table["size"], dtype=np.int64), (len(times), 1))
+    frames = Split(names, paths, nominal_cameras(sizes), np.array(times, dtype=np.float64))
+    return unposed(root, "video", frames, files=(root,))
+
+
+def frame_name(number: int) -> str:
+    """Name of the frame with this number in the video, from 0."""
+    return f"frame_{number:06d}"
+
+
+def _extract(root: Path, folder: Path) -> tuple[list[float], list[int]]:
+    times: list[float] = []
+    size = [0, 0]
+    for number, frame in enumerate(_frames(root)):
+        size = [frame.width, frame.height]
+        image = frame.to_image()
+        image.thumbnail((SMALL, SMALL))
+        image.save(folder / f"{frame_name(number)}.jpg", quality=92)
+        times.append(float(frame.time) if frame.time is not None else float(number))
+    if len(times) < 2:
+        raise UserError(f"video '{root}' has {len(times)} frames that can be decoded; at least two are needed")
+    return times, size
+
+
+def _frames(root: Path) -> Iterator[Any]:
+    try:
+        import av
+    except ImportError:
+        raise UserError("reading a video needs PyAV: pip install 'viewbench[video]'") from None
+    try:
+        with av.open(str(root)) as container:
+            if not container.streams.video:
+                raise UserError(f"'{root}' has no video in it")
+            container.streams.video[0].thread_type = "AUTO"
+            yield from container.decode(video=0)
+    except (av.FFmpegError, ValueError, OSError) as error:
+        raise UserError(f"video '{root}' cannot be decoded: {error}") from None
+
+
+def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
+    """Decodes the video once more and writes the chosen frames at full size, as PNG, to images/."""
+    wanted = {scene.train.names[i] for i in indices}
+    (out / "images").mkdir()
+    left = len(wanted)
+    for number, frame in enumerate(_frames(scene.root)):
+        name = frame_name(number)
+        if name in wanted:
+            frame.to_image().save(out / "images" / f"{name}.png", compress_level=4)
+            left -= 1
+            if not left:
+                break

@@ -1,0 +1,134 @@
+"""Captures without poses: a folder of images, and a video."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from viewbench.common import settings as settings_file
+from viewbench.common.errors import UserError
+from viewbench.scenes.load import open_scene
+from viewbench.selectors import _run
+from viewbench.workflow.commands import _main
+
+SETTINGS = settings_file.load()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Twelve pictures of four colours, three alike in a row; named so that 10 comes after 9 by number only."""
+    root = tmp_path / "my capture"
+    root.mkdir()
+    rng = np.random.default_rng(0)
+    for number in range(12):
+        colour = np.eye(3)[number // 3 % 3] * 200 if number < 9 else np.full(3, 128)
+        pixels = np.clip(colour + rng.normal(size=(48, 64, 3)), 0, 255).astype(np.uint8)
+        Image.fromarray(pixels).save(root / f"shot {number}.png")
+    return root
+
+
+def features():
+    """One row per picture: those of one colour are nearly the same."""
+    return np.repeat(np.eye(4), 3, axis=0) + 0.01 * np.random.default_rng(1).normal(size=(12, 4))
+
+
+def test_a_folder_is_read_in_natural_order(folder):
+    scene = open_scene(str(folder), SETTINGS)
+    assert (scene.format, scene.posed) == ("images", False)
+    assert scene.train.names == tuple(f"shot {number}.png" for number in range(12))
+
+
+def test_content_alone_decides(folder):
+    scene = open_scene(str(folder), SETTINGS)
+    record = _run.run(scene, "maxmin", 4, 0, {}, features())
+    assert sorted(index // 3 for index in record["indices"]) == [0, 1, 2, 3]  # one of each colour
+    assert record["parameters"]["factors"] == ["sem"]
+    assert len(_run.run(scene, "uniform", 4, 0)["indices"]) == 4
+
+
+@pytest.mark.parametrize(
+    ("selector", "parameters", "words"),
+    [("coverage", {}, "needs poses"), ("kcenter", {}, "image content only"), ("maxmin", {}, "image content only")],
+)
+def test_what_needs_poses_is_refused(folder, selector, parameters, words):
+    scene = open_scene(str(folder), SETTINGS)
+    with pytest.raises(UserError, match=words):
+        _run.run(scene, selector, 3, 0, parameters)
+
+
+def test_the_command_line_writes_the_chosen_images(folder, tmp_path, capsys):
+    np.save(tmp_path / "f.npy", features())
+    out = tmp_path / "out"
+    arguments = ["select", folder, "--count", 4, "--features", tmp_path / "f.npy", "--out", out]
+    assert _main.run([str(argument) for argument in arguments]) == 0
+    chosen = json.loads((out / "selection.json").read_text())["names"]
+    assert sorted(path.name for path in (out / "images").iterdir()) == sorted(chosen)
+    assert len(capsys.readouterr().out.splitlines()) == 4
+
+
+def test_images_of_two_sizes_are_refused(folder):
+    Image.new("RGB", (10, 10)).save(folder / "shot 12.png")
+    with pytest.raises(UserError, match=r"shot 12\.png.*10 x 10"):
+        open_scene(str(folder), SETTINGS)
+
+
+def test_a_file_that_is_no_image_is_named(folder):
+    (folder / "shot 3.png").write_bytes(b"no picture")
+    with pytest.raises(UserError, match=r"shot 3\.png"):
+        open_scene(str(folder), SETTINGS)
+
+
+def test_training_is_refused(folder, tmp_path, capsys):
+    np.save(tmp_path / "f.npy", features())
+    selection = tmp_path / "s.json"
+    base = ["select", folder, "--count", 4, "--features", tmp_path / "f.npy", "--selection", selection]
+    assert _main.run([str(argument) for argument in base]) == 0
+    capsys.readouterr()
+    arguments = ["train", folder, "--selection", selection, "--out", tmp_path / "m", "--iterations", 5]
+    assert _main.run([str(argument) for argument in arguments]) == 2
+    assert "no poses" in capsys.readouterr().err
+    assert not (tmp_path / "m").exists()
+
+
+@pytest.fixture
+def video(tmp_path, monkeypatch):
+    """Thirty frames at 10 per second whose brightness says which they are."""
+    av = pytest.importorskip("av")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "walk.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for number in range(30):
+            pixels = np.full((48, 64, 3), 8 * number, np.uint8)
+            for packet in stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")):
+                container.mux(packet)
+        for packet in stream.encode():
+            container.mux(packet)
+    return path
+
+
+def test_a_video_is_thinned_to_full_size_frames_with_their_numbers(video, tmp_path):
+    scene = open_scene(str(video), SETTINGS)
+    assert (scene.format, len(scene.train), scene.posed) == ("video", 30, False)
+    np.testing.assert_allclose(np.diff(scene.train.times), 0.1, atol=1e-3)
+    out = tmp_path / "out"
+    arguments = ["select", video, "--count", 5, "--selector", "uniform", "--out", out]
+    assert _main.run([str(argument) for argument in arguments]) == 0
+    files = sorted((out / "images").iterdir())
+    assert len(files) == 5
+    for path in files:
+        number = int(path.stem.removeprefix("frame_"))
+        with Image.open(path) as image:
+            assert image.size == (64, 48)
+            assert abs(np.asarray(image).mean() - 8 * number) < 6
+
+
+def test_a_broken_video_is_one_sentence(tmp_path, monkeypatch):
+    pytest.importorskip("av")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "walk.mp4"
+    path.write_bytes(b"no video at all" * 100)
+    with pytest.raises(UserError, match=r"walk\.mp4"):
+        open_scene(str(path), SETTINGS)
