@@ -87,14 +87,12 @@ def run(
 def _without_poses(scene: Scene, selector: str, options: dict[str, Any], features: np.ndarray | None) -> dict[str, Any]:
     """The options for a capture that has no poses: image content is the only factor.
 
-    Raises UserError for a selector that needs poses, and for one that compares views when there are no features.
+    Raises UserError for a selector that needs poses, and for one that compares content when there are no features.
     """
-    if selector not in PLAIN and (selector == "coverage" or ("factor" in options and options["factor"] != "sem")):
-        raise UserError(
-            f"'{selector}' compares poses, which '{scene.name}' does not have; use maxmin, logdet or uniform"
-        )
-    if "factors" not in options:
+    if selector in PLAIN:
         return options
+    if "factors" not in options:
+        raise UserError(f"'{selector}' needs poses, which '{scene.name}' does not have; use maxmin, logdet or uniform")
     if features is None:
         raise UserError(
             f"'{scene.name}' has no poses, so '{selector}' can compare image content only: "
