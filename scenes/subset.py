@@ -12,13 +12,33 @@ from viewbench.common.files import whole_folder, write_json
 from viewbench.scenes.types import Scene
 
 
-def write_subset(scene: Scene, selection: dict[str, Any], out: Path, copy: bool = False, force: bool = False) -> None:
-    """Writes the chosen training views and the whole test split to the folder `out`, in the format that was read.
+def write_subset(scene: Scene, selection: dict[str, Any], out: Path, copy: bool = False, force: bool = False) -> str:
+    """Writes the chosen training views and the whole test split to the folder `out`; returns the format written.
 
-    Images are linked, or with `copy` copied. The folder appears only when all of it is written. Raises UserError for
-    a format that is only read, and for a folder that exists and is not empty unless `force` replaces it.
+    It is the one that was read or, where that is only read, transforms. Images are linked, or with `copy` copied. The
+    folder appears only when all of it is written. Raises UserError for an image that is missing or cut short, and for
+    a folder that exists and is not empty unless `force` replaces it.
     """
-    write_scene(scene, np.asarray(selection["indices"], dtype=np.int64), out, scene.format, copy, force, selection)
+    written = scene.format if plugins.load("scenes.formats", scene.format).WRITABLE else "transforms"
+    indices = np.asarray(selection["indices"], dtype=np.int64)
+    if scene.format != "video":
+        for path in scene.train.subset(indices).paths:
+            check_image(path)
+    write_scene(scene, indices, out, written, copy, force, selection)
+    return written
+
+
+def check_image(path: Path) -> None:
+    """Raises UserError for an image that is missing or whose data ends too early."""
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            image.load()
+    except FileNotFoundError:
+        raise UserError(f"image '{path}' is missing") from None
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
+        raise UserError(f"image '{path}' cannot be read: {error}") from None
 
 
 def write_scene(

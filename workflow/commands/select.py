@@ -69,7 +69,9 @@ def command(**given: Any) -> None:
     if given["out"] and not given["dry_run"]:
         from viewbench.scenes.subset import write_subset
 
-        write_subset(scene, record, given["out"], copy=given["copy"], force=given["force"])
+        written = write_subset(scene, record, given["out"], copy=given["copy"], force=given["force"])
+        if written != scene.format:
+            click.echo(f"viewbench: format {scene.format} is only read; the subset is written as {written}", err=True)
     if given["plot"]:
         from viewbench.reports._selection_plot import plot
 

@@ -1,0 +1,90 @@
+"""Whatever a file holds, a reader returns a scene or one sentence."""
+
+import contextlib
+import json
+import shutil
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.scenes import test_rgbd
+from viewbench.common import settings as settings_file
+from viewbench.common.errors import UserError
+from viewbench.scenes.load import open_scene
+
+SETTINGS = settings_file.load()
+QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+JSON = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5) | st.just(1e400),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+    max_leaves=6,
+)
+KEYS = [
+    "frames",
+    "fl_x",
+    "w",
+    "h",
+    "camera_angle_x",
+    "cx",
+    "k1",
+    "ply_file_path",
+    "file_path",
+    "transform_matrix",
+    "time",
+]
+
+
+def survives(root):
+    with contextlib.suppress(UserError):
+        open_scene(str(root), SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def room(small_room, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fuzz") / "room"
+    shutil.copytree(small_room, folder)
+    return folder
+
+
+@QUICK
+@given(key=st.sampled_from(KEYS), value=JSON, deep=st.booleans())
+def test_any_value_in_transforms(room, small_room, key, value, deep):
+    table = json.loads((small_room / "transforms_train.json").read_text())
+    (table["frames"][1] if deep else table)[key] = value
+    (room / "transforms_train.json").write_text(json.dumps(table))
+    survives(room)
+
+
+@QUICK
+@given(content=st.binary(max_size=60) | st.text(max_size=60).map(str.encode), name=st.sampled_from(["json", "ply"]))
+def test_any_bytes_as_transforms_and_points(room, small_room, content, name):
+    for file in ("transforms_train.json", "points3d.ply"):
+        shutil.copy(small_room / file, room / file)
+    (room / {"json": "transforms_train.json", "ply": "points3d.ply"}[name]).write_bytes(content)
+    survives(room)
+
+
+@pytest.mark.parametrize("form", test_rgbd.FORMATS)
+def test_any_bytes_in_the_files_of_other_formats(form, tmp_path):
+    root = tmp_path / "capture"
+    root.mkdir()
+    test_rgbd.FORMATS[form](root)
+    files = sorted(path for path in root.parent.rglob("*") if path.suffix in (".txt", ".json"))
+
+    @settings(QUICK, max_examples=40)
+    @given(
+        file=st.sampled_from(files),
+        content=st.binary(max_size=40) | st.text("0123456789 .-enaifx#\n\t", max_size=60).map(str.encode),
+        cut=st.floats(0, 1),
+        replace=st.booleans(),
+    )
+    def check(file, content, cut, replace):
+        original = file.read_bytes()
+        try:
+            file.write_bytes(content if replace else original[: int(cut * len(original))] + content)
+            survives(root)
+        finally:
+            file.write_bytes(original)
+
+    check()
