@@ -13,16 +13,24 @@ from viewbench.scenes.validate import check_scene
 FORMATS = "scenes.formats"
 
 
-def open_scene(name_or_path: str, settings: Settings, format: str | None = None, holdout: str | None = None) -> Scene:
+def open_scene(
+    name_or_path: str,
+    settings: Settings,
+    format: str | None = None,
+    holdout: str | None = None,
+    allow_outside: bool = False,
+) -> Scene:
     """The scene that `environment.toml` calls by this name, or the one in this folder.
 
     `format` forces a reader, `holdout` a test split ("every:8", "blocks:8", "none") where the format has none.
+    `allow_outside` lets transforms name images outside the folder.
     Raises UserError for an unknown name, a folder in no known format, and whatever is wrong with its contents.
     """
     entry = settings.scenes.get(name_or_path)
     root = _folder(name_or_path, entry, settings)
     chosen = format or (entry.format if entry else "") or detect(root)
-    scene = plugins.load(FORMATS, chosen).read(root)
+    reader = plugins.load(FORMATS, chosen)
+    scene = reader.read(root, allow_outside=True) if allow_outside and chosen == "transforms" else reader.read(root)
     scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name)
     scene = hold_out(scene, holdout or (entry.holdout if entry else "") or "none")
     check_scene(scene)

@@ -67,6 +67,10 @@ def read(root: Path) -> Scene:
         distortion=values[:, 6:] if values[:, 6:].any() else None,
     )
     names = tuple(image.name for image in images)
+    if folder.name != "images":  # images_2, images_4, images_8: the model speaks of the full size
+        from viewbench.scenes.formats._frames import image_size
+
+        cameras = cameras.scaled(image_size(folder / names[0])[0])
     every = Split(names, tuple(folder / name for name in names), cameras)
     held = _held_out(model, names)
     kept = np.setdiff1d(np.arange(len(names)), held)

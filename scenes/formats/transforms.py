@@ -12,42 +12,67 @@ from viewbench.scenes.subset import place_image
 from viewbench.scenes.types import Cameras, Points, Scene, Split
 
 WRITABLE = True
+SINGLE, TRAIN, TESTS = "transforms.json", "transforms_train.json", ("transforms_test.json", "transforms_val.json")
 SUFFIXES = (".png", ".jpg", ".jpeg", ".JPG", ".PNG")  # tried in turn where file_path has none, as Blender's has not
 
 
 def detect(root: Path) -> str | None:
     """Why the folder is in this format, or None."""
-    for name in ("transforms.json", "transforms_train.json"):
+    for name in (SINGLE, TRAIN):
         if (root / name).is_file():
             return f"it has {name}"
     return None
 
 
-def read(root: Path) -> Scene:
+def read(root: Path, allow_outside: bool = False) -> Scene:
     """Reads both splits, poses as they stand (they are camera-to-world with OpenGL axes already) and points.
 
+    The test split is that of transforms_test.json (or transforms_val.json), or of nerfstudio's test_filenames (or
+    val_filenames) in a single transforms.json. A file_path that leaves the folder is refused unless `allow_outside`.
     Raises UserError for files that are missing or not as documented.
     """
-    names = {"train": "transforms_train.json", "test": "transforms_test.json"}
-    if (root / "transforms.json").is_file():
-        names = {"train": "transforms.json"}
-    files = [root / name for name in names.values() if (root / name).is_file()]
-    tables = {split: read_json(root / name, "transforms") for split, name in names.items() if (root / name).is_file()}
-    splits = {split: _split(root, root / names[split], table) for split, table in tables.items()}
+    if (root / SINGLE).is_file():
+        files = {"train": root / SINGLE}
+    else:
+        test = next((root / name for name in TESTS if (root / name).is_file()), None)
+        files = {"train": root / TRAIN} | ({"test": test} if test else {})
+    tables = {key: read_json(file, "transforms") for key, file in files.items()}
+    splits = {key: _split(root, files[key], table, allow_outside) for key, table in tables.items()}
+    train, test_split = splits["train"], splits.get("test")
+    if test_split is None:
+        train, test_split = _listed(files["train"], tables["train"], train)
     points, point_file = _points(root, tables["train"])
     return Scene(
         name=root.name,
         root=root,
         format="transforms",
-        train=splits["train"],
-        test=splits.get("test") or splits["train"].subset([]),
+        train=train,
+        test=test_split,
         points=points,
-        files=tuple(files + ([point_file] if point_file else [])),
+        files=(*files.values(), *([point_file] if point_file else [])),
         details={"tables": tables},
     )
 
 
-def _split(root: Path, file: Path, table: Any) -> Split:
+def _listed(file: Path, table: dict, frames: Split) -> tuple[Split, Split]:
+    """Both splits by nerfstudio's lists of file names. Raises UserError for a name that no frame has."""
+    if not isinstance(table.get("train_filenames"), list):
+        return frames, frames.subset([])
+    index = {name: i for i, name in enumerate(frames.names)}
+    chosen = []
+    for key in ("train_filenames", "test_filenames" if table.get("test_filenames") else "val_filenames"):
+        listed = table.get(key) or []
+        unknown = [name for name in listed if not isinstance(name, str) or name not in index]
+        if unknown:
+            raise UserError(f"'{file}': {key} names {unknown[0]!r}, which no frame has")
+        chosen.append(sorted({index[name] for name in listed}))
+    both = set(chosen[0]) & set(chosen[1])
+    if both:
+        raise UserError(f"'{file}': frame '{frames.names[min(both)]}' is listed for training and for testing")
+    return frames.subset(chosen[0]), frames.subset(chosen[1])
+
+
+def _split(root: Path, file: Path, table: Any, allow_outside: bool) -> Split:
     if not isinstance(table, dict) or not isinstance(table.get("frames"), list):
         raise UserError(f"'{file}' has no list 'frames'; it should be a Blender or nerfstudio transforms file")
     rows, names, paths, poses, times = [], [], [], [], []
@@ -56,7 +81,7 @@ def _split(root: Path, file: Path, table: Any) -> Split:
         if not isinstance(frame, dict) or not isinstance(frame.get("file_path"), str):
             raise UserError(f"'{file}': frame {number} has no file_path")
         name = frame["file_path"]
-        path = _image(root, name, file)
+        path = _image(root, name, file, allow_outside)
         rows.append(_intrinsics({**table, **frame}, name, path, file, sizes))
         poses.append(_pose(frame, name, file))
         names.append(name)
@@ -77,10 +102,15 @@ def _split(root: Path, file: Path, table: Any) -> Split:
     return Split(tuple(names), tuple(paths), cameras, np.array(times, dtype=np.float64) if timed else None)
 
 
-def _image(root: Path, name: str, file: Path) -> Path:
+def _leaves(name: str) -> bool:
     pure = PurePosixPath(name)
-    if pure.is_absolute() or ".." in pure.parts or "\0" in name:
-        raise UserError(f"'{file}': file_path '{name}' leaves the scene folder")
+    return pure.is_absolute() or ".." in pure.parts
+
+
+def _image(root: Path, name: str, file: Path, allow_outside: bool) -> Path:
+    pure = PurePosixPath(name)
+    if "\0" in name or (_leaves(name) and not allow_outside):
+        raise UserError(f"'{file}': file_path '{name}' leaves the scene folder; give --allow-outside if that is meant")
     path = root / pure
     if path.is_file() or pure.suffix:
         return path
@@ -153,39 +183,51 @@ def _points(root: Path, table: dict) -> tuple[Points | None, Path | None]:
 
 
 def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
-    """Writes transforms_train.json and transforms_test.json, or one transforms.json where there is no test split.
+    """Writes what was read with fewer frames: a single transforms.json stays one, two files stay two.
 
-    A scene that was read from this format keeps all its own keys. Points are written as points3d.ply.
+    A scene that was read from this format keeps all its own keys; one from another format becomes transforms_train and
+    transforms_test, or a single file where it has no test split. In a single file the test split, if any, stands in
+    nerfstudio's lists of file names. Points are written as points3d.ply.
     """
     from viewbench.scenes.ply import write_points
 
-    train = scene.train.subset(indices)
-    names = {"train": "transforms_train.json", "test": "transforms_test.json"}
-    if not len(scene.test):
-        names = {"train": "transforms.json"}
-    own = scene.details.get("tables", {}) if scene.format == "transforms" else {}
-    known = {frame["file_path"]: (table, frame) for table in own.values() for frame in table["frames"]}
-    for key, split in (("train", train), ("test", scene.test)):
-        if key not in names:
-            continue
-        head = dict(own.get(key) or own.get("train") or {})
-        for stale in ("train_filenames", "val_filenames", "test_filenames"):
-            head.pop(stale, None)
-        frames = [
-            dict(known[name][1]) if name in known else _frame(split.cameras[i], f"images/{name}")
-            for i, name in enumerate(split.names)
-        ]
-        for frame, name, source in zip(frames, split.names, split.paths, strict=True):
-            stored = PurePosixPath(frame["file_path"])
-            target = stored if stored.suffix else stored.with_name(stored.name + source.suffix)
-            place_image(source, out / target, copy)
-            if name not in known and split.times is not None:
-                frame["time"] = float(split.times[split.names.index(name)])
-        if scene.points is not None:
-            head["ply_file_path"] = "points3d.ply"
-        write_json(out / names[key], {**head, "frames": frames})
+    own = scene.details["tables"] if scene.format == "transforms" else {}
+    head = {key: value for key, value in own.get("train", {}).items() if not key.endswith("_filenames")}
     if scene.points is not None:
         write_points(out / "points3d.ply", scene.points)
+        head["ply_file_path"] = "points3d.ply"
+    frames = _frames(scene.train.subset(indices), own, out, copy)
+    held = _frames(scene.test, own, out, copy)
+    single = (scene.root / SINGLE).is_file() if own else not held
+    if not single:
+        write_json(out / TRAIN, {**head, "frames": frames})
+        write_json(out / TESTS[0], {**head, **own.get("test", {}), "frames": held})
+        return
+    lists = {}
+    if held:
+        names = [frame["file_path"] for frame in held]
+        lists = {"train_filenames": [frame["file_path"] for frame in frames]}
+        lists |= {"val_filenames": names, "test_filenames": names}
+    write_json(out / SINGLE, {**head, **lists, "frames": frames + held})
+
+
+def _frames(split: Split, own: dict[str, dict], out: Path, copy: bool) -> list[dict[str, Any]]:
+    """The frames of a split as they are written, their images placed; outside paths come to images/."""
+    known = {frame["file_path"]: frame for table in own.values() for frame in table["frames"]}
+    made = []
+    for i, (name, source) in enumerate(zip(split.names, split.paths, strict=True)):
+        if name in known:
+            frame = dict(known[name])
+            if _leaves(name):
+                frame["file_path"] = f"images/{i:05d}_{source.name}"
+        else:
+            frame = _frame(split.cameras[i], f"images/{name}")
+            if split.times is not None:
+                frame["time"] = float(split.times[i])
+        stored = PurePosixPath(frame["file_path"])
+        place_image(source, out / (stored if stored.suffix else stored.with_name(stored.name + source.suffix)), copy)
+        made.append(frame)
+    return made
 
 
 def _frame(camera: Cameras, file_path: str) -> dict[str, Any]:

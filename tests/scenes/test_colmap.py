@@ -89,6 +89,15 @@ def test_the_test_split_stays_the_test_split(model, tmp_path):
     assert (again.train.names, again.test.names) == (("frame3.png",), scene.test.names)
 
 
+def test_smaller_images_have_smaller_cameras(model):
+    (model / "images").rename(model / "images_2")
+    for path in (model / "images_2").rglob("*.png"):
+        Image.open(path).resize((6, 4)).save(path)
+    scene = opened(model)
+    cameras = scene.train.cameras
+    assert (cameras.width[0], cameras.height[0], cameras.fx[0], cameras.cx[0]) == (6, 4, 5, 3)
+
+
 def test_both_ways_between_the_formats(model, small_room, tmp_path):
     room = opened(small_room)
     write_scene(room, np.arange(12), tmp_path / "colmap", "colmap")

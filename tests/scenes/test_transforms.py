@@ -110,6 +110,45 @@ def test_a_write_that_fails_leaves_nothing(small_room, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["copy"]
 
 
+def test_nerfstudio_lists_make_the_test_split_and_are_written_again(tmp_path):
+    lists = {"train_filenames": ["a.png", "c.png", "d.png"], "val_filenames": ["b.png"], "applied_transform": [[1]]}
+    scene = opened(write(tmp_path / "in", frames("a.png", "b.png", "c.png", "d.png"), fl_x=5, **lists))
+    assert (scene.train.names, scene.test.names) == (("a.png", "c.png", "d.png"), ("b.png",))
+    write_subset(scene, {"indices": [2, 0]}, tmp_path / "out")
+    table = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert table["train_filenames"] == ["d.png", "a.png"]
+    assert table["val_filenames"] == table["test_filenames"] == ["b.png"]
+    assert table["applied_transform"] == [[1]]
+    assert opened(tmp_path / "out").test.names == ("b.png",)
+
+
+def test_a_held_out_split_of_a_single_file_is_written_as_lists(tmp_path):
+    scene = opened(write(tmp_path / "in", frames("a.png", "b.png", "c.png", "d.png"), fl_x=5), holdout="every:2")
+    write_subset(scene, {"indices": [1]}, tmp_path / "out")
+    again = opened(tmp_path / "out")
+    assert (again.train.names, again.test.names) == (("d.png",), ("a.png", "c.png"))
+
+
+def test_transforms_val_is_the_test_split_where_there_is_no_other(small_room, tmp_path):
+    shutil.copytree(small_room, tmp_path / "copy")
+    (tmp_path / "copy" / "transforms_test.json").rename(tmp_path / "copy" / "transforms_val.json")
+    assert len(opened(tmp_path / "copy").test) == 4
+
+
+def test_images_outside_the_folder_only_when_asked(tmp_path):
+    folder = tmp_path / "in"
+    folder.mkdir()
+    Image.new("RGB", (8, 6)).save(tmp_path / "a.png")
+    write(folder, frames("../a.png", "b.png"), fl_x=5)
+    with pytest.raises(UserError, match="--allow-outside"):
+        opened(folder)
+    scene = opened(folder, allow_outside=True)
+    write_subset(scene, {"indices": [0, 1]}, tmp_path / "out")
+    again = opened(tmp_path / "out")
+    assert again.train.names == ("images/00000_a.png", "b.png")
+    assert all(path.is_file() for path in again.train.paths)
+
+
 SKEWED = [[1, 0.1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 BROKEN = {
     "no frames": ({"frames": 3}, "no list 'frames'"),

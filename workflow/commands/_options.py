@@ -14,6 +14,7 @@ format_option = click.option("--format", "format_", metavar="NAME", help="Force 
 holdout_option = click.option(
     "--holdout", metavar="RULE", help="Test split where the capture has none: every:8, blocks:8 or none."
 )
+outside_option = click.option("--allow-outside", is_flag=True, help="Let transforms name images outside the folder.")
 encoder_option = click.option("--encoder", metavar="NAME", help="Image encoder (viewbench list encoders).")
 out_option = click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder to write.")
 

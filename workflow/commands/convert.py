@@ -15,7 +15,17 @@ from viewbench.workflow.commands import _options
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
 @_options.format_option
 @_options.holdout_option
-def command(scene: str, out: Path, to: str, copy: bool, force: bool, format_: str | None, holdout: str | None) -> None:
+@_options.outside_option
+def command(
+    scene: str,
+    out: Path,
+    to: str,
+    copy: bool,
+    force: bool,
+    format_: str | None,
+    holdout: str | None,
+    allow_outside: bool,
+) -> None:
     """Write all views of SCENE to --out in the format --to."""
     import numpy as np
 
@@ -23,6 +33,6 @@ def command(scene: str, out: Path, to: str, copy: bool, force: bool, format_: st
     from viewbench.scenes.load import open_scene
     from viewbench.scenes.subset import write_scene
 
-    opened = open_scene(scene, settings_file.load(), format=format_, holdout=holdout)
+    opened = open_scene(scene, settings_file.load(), format=format_, holdout=holdout, allow_outside=allow_outside)
     write_scene(opened, np.arange(len(opened.train)), out, to, copy, force)
     click.echo(f"{len(opened.train)} training and {len(opened.test)} test views in {out}")

@@ -12,14 +12,17 @@ from viewbench.workflow.commands import _options
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @_options.format_option
 @_options.holdout_option
-def command(scene: str, as_json: bool, format_: str | None, holdout: str | None) -> None:
+@_options.outside_option
+def command(scene: str, as_json: bool, format_: str | None, holdout: str | None, allow_outside: bool) -> None:
     """Say what was detected in SCENE, a folder or a name of environment.toml."""
     from viewbench.common import settings as settings_file
     from viewbench.common.files import plain
     from viewbench.scenes.load import open_scene
     from viewbench.scenes.summary import summary
 
-    facts = summary(open_scene(scene, settings_file.load(), format=format_, holdout=holdout))
+    facts = summary(
+        open_scene(scene, settings_file.load(), format=format_, holdout=holdout, allow_outside=allow_outside)
+    )
     if as_json:
         click.echo(json.dumps(plain(facts), indent=1))
         return

@@ -32,6 +32,7 @@ from viewbench.workflow.commands import _options
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
 @_options.format_option
 @_options.holdout_option
+@_options.outside_option
 def command(**given: Any) -> None:
     """Choose views of SCENE and write them to --out, in the format that was read, with selection.json."""
     import numpy as np
@@ -47,7 +48,13 @@ def command(**given: Any) -> None:
     if not (given["out"] or given["selection"] or given["dry_run"]):
         raise UserError("give --out FOLDER, or --dry-run to see the choice without writing it")
     settings = settings_file.load()
-    scene = open_scene(given["scene"], settings, format=given["format_"], holdout=given["holdout"])
+    scene = open_scene(
+        given["scene"],
+        settings,
+        format=given["format_"],
+        holdout=given["holdout"],
+        allow_outside=given["allow_outside"],
+    )
     n = len(scene.train)
     count = given["count"] if given["ratio"] is None else _run.count_of(given["ratio"], n)
     parameters = _options.settings_of(given["options"])
