@@ -17,12 +17,17 @@ def plot(path: Path, title: str, positions: np.ndarray, forward: np.ndarray, cho
     `positions` (N, 3) in scene units, `forward` (N, 3) unit viewing directions, `chosen` (K,) indices in the order
     chosen. Raises UserError for a kind of file that is not drawn, or without plotly where `.html` is asked for.
     """
+    draw = _interactive if kind_of(path) == ".html" else _from_above
+    with whole(path) as temporary:
+        draw(temporary, title, positions, forward, chosen)
+
+
+def kind_of(path: Path) -> str:
+    """The ending of the file, one of KINDS. Raises UserError for another."""
     kind = path.suffix.lower()
     if kind not in KINDS:
         raise UserError(f"--plot '{path}': expected a file ending in one of {', '.join(KINDS)}{nearest(kind, KINDS)}")
-    draw = _interactive if kind == ".html" else _from_above
-    with whole(path) as temporary:
-        draw(temporary, title, positions, forward, chosen)
+    return kind
 
 
 def _arrow(positions: np.ndarray) -> float:

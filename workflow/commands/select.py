@@ -47,6 +47,10 @@ def command(**given: Any) -> None:
         raise UserError("give either --ratio or --count")
     if not (given["out"] or given["selection"] or given["dry_run"]):
         raise UserError("give --out FOLDER, or --dry-run to see the choice without writing it")
+    if given["plot"]:
+        from viewbench.reports._selection_plot import kind_of, plot
+
+        kind_of(given["plot"])
     settings = settings_file.load()
     scene = open_scene(
         given["scene"],
@@ -80,8 +84,6 @@ def command(**given: Any) -> None:
         if written != scene.format:
             click.echo(f"viewbench: format {scene.format} is only read; the subset is written as {written}", err=True)
     if given["plot"]:
-        from viewbench.reports._selection_plot import plot
-
         title = f"{scene.name}: {count} of {n} views by {given['selector']}"
         cameras = scene.train.cameras
         plot(given["plot"], title, cameras.positions, cameras.forward, np.asarray(record["indices"]))
