@@ -50,7 +50,8 @@ def read(root: Path) -> Scene:
     poses = _poses(truth[match[kept], 1:], root / "groundtruth.txt")
     lost = int((~kept).sum())
     # Published principal points count from the centre of the first pixel.
-    train = split(root, chosen, poses, values[:2], (values[2] + 0.5, values[3] + 0.5), stamps[kept], values[4:])
+    fx, fy, cx, cy = values[:4]
+    train = split(root, chosen, poses, (fx, fy), (cx + 0.5, cy + 0.5), stamps[kept], values[4:])
     camera = (root / CAMERA,) if (root / CAMERA).is_file() else ()
     return Scene(
         name=root.name,
@@ -107,7 +108,7 @@ def _camera(root: Path) -> tuple[float, ...]:
             raise UserError(f"intrinsics '{root / CAMERA}' have {len(values)} numbers, expected 4 or 8")
         return tuple(values + [0.0] * (8 - len(values)))
     name = root.resolve().name
-    for camera, values in CAMERAS.items():
+    for camera, known in CAMERAS.items():
         if camera in name:
-            return values
+            return known
     raise UserError(f"the camera of '{root}' is not known: write fx fy cx cy [k1 k2 p1 p2] into '{root / CAMERA}'")
