@@ -76,6 +76,8 @@ def _interactive(path: Path, title: str, positions: np.ndarray, forward: np.ndar
         import plotly.graph_objects as go
     except ImportError:
         raise UserError("an interactive picture needs plotly: pip install 'viewbench[plot]'") from None
+    from viewbench.reports._topview import plane
+
     tips = positions[chosen] + _arrow(positions) * forward[chosen]
     rays = np.stack([positions[chosen], tips, np.full_like(tips, np.nan)], axis=1).reshape(-1, 3)
     order = [f"chosen as number {rank + 1}, frame {index}" for rank, index in enumerate(chosen)]
@@ -87,8 +89,11 @@ def _interactive(path: Path, title: str, positions: np.ndarray, forward: np.ndar
             go.Scatter3d(**_xyz(positions[chosen]), mode="markers", marker=orange, name="chosen", hovertext=order),
         ]
     )
-    figure.update_layout(title=title, scene={"aspectmode": "data"}, margin={"l": 0, "r": 0, "b": 0, "t": 40})
-    figure.write_html(path, include_plotlyjs=True)
+    right, away = plane(positions, forward)
+    up = np.cross(right, away)
+    view = {"up": dict(zip("xyz", up, strict=True)), "eye": dict(zip("xyz", 1.7 * up - 1.2 * away, strict=True))}
+    figure.update_layout(title=title, scene={"aspectmode": "data", "camera": view}, margin={"l": 0, "r": 0, "b": 0})
+    figure.write_html(path, include_plotlyjs=True, default_height="95vh")
 
 
 def _xyz(points: np.ndarray) -> dict[str, list[float | None]]:

@@ -32,7 +32,7 @@ def open_scene(
     reader = plugins.load(FORMATS, chosen)
     scene = reader.read(root, allow_outside=True) if allow_outside and chosen == "transforms" else reader.read(root)
     scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name)
-    scene = hold_out(scene, holdout or (entry.holdout if entry else "") or "none")
+    scene = hold_out(scene, holdout or (entry.holdout if entry else "") or scene.details.get("holdout", "none"))
     check_scene(scene)
     return scene
 

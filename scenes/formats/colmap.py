@@ -84,8 +84,13 @@ def read(root: Path) -> Scene:
         test=every.subset(held),
         points=_points(reconstruction, place),
         files=tuple(sorted(path for path in model.iterdir() if path.suffix in (".bin", ".txt"))),
-        details={"model": model, "images": folder},
+        details={"model": model, "images": folder} | _convention(root, held),
     )
+
+
+def _convention(root: Path, held: np.ndarray) -> dict[str, str]:
+    """Mip-NeRF 360 and LLFF, which have poses_bounds.npy, test on every 8th image unless somebody says otherwise."""
+    return {"holdout": "every:8"} if (root / "poses_bounds.npy").is_file() and not len(held) else {}
 
 
 def _check_counts(model: Path) -> None:

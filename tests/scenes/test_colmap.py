@@ -89,6 +89,12 @@ def test_the_test_split_stays_the_test_split(model, tmp_path):
     assert (again.train.names, again.test.names) == (("frame3.png",), scene.test.names)
 
 
+def test_mip_nerf_360_tests_on_every_eighth(model):
+    (model / "poses_bounds.npy").write_bytes(b"")
+    assert opened(model).test.names == ("frame2.png",)
+    assert len(opened(model, holdout="none").test) == 0
+
+
 def test_smaller_images_have_smaller_cameras(model):
     (model / "images").rename(model / "images_2")
     for path in (model / "images_2").rglob("*.png"):
