@@ -9,7 +9,9 @@ RIGID = 1e-3  # largest deviation of RᵀR from the identity; poses are often wr
 
 
 def check_scene(scene: Scene) -> None:
-    """Raises UserError for no frames, duplicate names, poses that are not rigid or finite, and bad intrinsics."""
+    """Raises UserError for no frames, duplicate names, mixed sizes, poses that are not rigid or finite, and bad
+    intrinsics.
+    """
     if not len(scene.train):
         raise UserError(f"scene '{scene.name}' has no training views in '{scene.root}'")
     names = [*scene.train.names, *scene.test.names]
@@ -18,6 +20,7 @@ def check_scene(scene: Scene) -> None:
         raise UserError(f"scene '{scene.name}': frame '{twice}' is listed twice; frame names must be unique")
     for split in (scene.train, scene.test):
         _check_split(scene, split)
+    _check_sizes(scene)
     if scene.points is not None and not np.isfinite(scene.points.xyz).all():
         raise UserError(f"scene '{scene.name}': its points have NaN or infinite coordinates; clean the point file")
 
@@ -40,3 +43,25 @@ def _check_split(scene: Scene, split: Split) -> None:
 
 def _first(split: Split, bad: np.ndarray) -> str:
     return split.names[int(np.flatnonzero(bad)[0])]
+
+
+def _check_sizes(scene: Scene) -> None:
+    """Raises UserError when frames have different sizes: trainers and scores want one."""
+    for split in (scene.train, scene.test):
+        sizes = np.stack([split.cameras.width, split.cameras.height], axis=1)
+        first = np.array([scene.train.cameras.width[0], scene.train.cameras.height[0]])
+        bad = (sizes != first).any(axis=1)
+        if bad.any():
+            i = int(np.flatnonzero(bad)[0])
+            raise UserError(
+                f"scene '{scene.name}' mixes sizes: frame '{split.names[i]}' is {sizes[i][0]} x {sizes[i][1]}, "
+                f"'{scene.train.names[0]}' {first[0]} x {first[1]}; resize the images to one size"
+            )
+
+
+def check_present(scene: Scene) -> None:
+    """Raises UserError for the first image of either split that is not there."""
+    for split in (scene.train, scene.test):
+        for name, path in zip(split.names, split.paths, strict=True):
+            if not path.is_file():
+                raise UserError(f"scene '{scene.name}': the image of frame '{name}' is missing: '{path}'")

@@ -136,3 +136,20 @@ def test_real_captures(data_root):
     binary, text = opened(data_root / "real_room", format="colmap"), opened(data_root / "real_room")
     assert len(binary.train) == 35
     assert text.format in ("colmap", "transforms")
+
+
+@pytest.mark.parametrize("name", ["hololens_space", "real_room", "diorama_room"])
+def test_subsets_of_real_captures_open_again(data_root, tmp_path, name):
+    scene = opened(data_root / name, holdout="every:8")
+    chosen = [7, 0, 3]
+    assert write_subset(scene, {"indices": chosen}, tmp_path / "out") == scene.format
+    again = opened(tmp_path / "out")
+    order = [again.train.names.index(scene.train.names[i]) for i in chosen]
+    np.testing.assert_allclose(again.train.cameras.c2w[order], scene.train.cameras.c2w[chosen], atol=1e-9)
+    assert set(again.test.names) == set(scene.test.names)
+    assert all(path.is_file() for path in (*again.train.paths, *again.test.paths))
+    if scene.format == "colmap":
+        model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
+        assert model.is_valid()
+        assert model.num_images() == 3 + len(scene.test)
+        assert model.num_points3D() > 100

@@ -149,6 +149,13 @@ def test_images_outside_the_folder_only_when_asked(tmp_path):
     assert all(path.is_file() for path in again.train.paths)
 
 
+def test_frames_of_two_sizes_are_refused(tmp_path):
+    listed = frames("a.png", "b.png")
+    listed[1] |= {"w": 16, "h": 12}
+    with pytest.raises(UserError, match=r"b\.png.*16 x 12"):
+        opened(write(tmp_path, listed, fl_x=5))
+
+
 SKEWED = [[1, 0.1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 BROKEN = {
     "no frames": ({"frames": 3}, "no list 'frames'"),

@@ -186,3 +186,15 @@ def test_a_damaged_image_among_the_chosen_is_named(capsys, small_room, tmp_path,
     assert status == 2
     assert ".jpg" in err.splitlines()[-1]
     assert not (tmp_path / "out").exists()
+
+
+def test_one_missing_image_is_named_even_if_it_is_not_chosen(capsys, small_room, tmp_path):
+    folder = tmp_path / "in"
+    shutil.copytree(small_room, folder)
+    chosen = names(capsys, folder, "--count", 1, *PLACES, "--dry-run")[0]
+    gone = next(path for path in sorted((folder / "train").iterdir()) if f"train/{path.name}" != chosen)
+    gone.unlink()
+    status, _, err = run(capsys, folder, "--count", 1, *PLACES, "--out", tmp_path / "out")
+    assert status == 2
+    assert gone.name in err
+    assert not (tmp_path / "out").exists()

@@ -41,6 +41,7 @@ def command(**given: Any) -> None:
     from viewbench.common.errors import UserError
     from viewbench.common.files import write_json
     from viewbench.scenes.load import open_scene
+    from viewbench.scenes.validate import check_present
     from viewbench.selectors import _run
 
     if (given["ratio"] is None) == (given["count"] is None):
@@ -59,6 +60,7 @@ def command(**given: Any) -> None:
         holdout=given["holdout"],
         allow_outside=given["allow_outside"],
     )
+    check_present(scene)
     n = len(scene.train)
     count = given["count"] if given["ratio"] is None else _run.count_of(given["ratio"], n)
     parameters = _options.settings_of(given["options"])
