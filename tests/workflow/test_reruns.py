@@ -1,5 +1,6 @@
 """A study through Snakemake in a copy of the package that the test may edit: what runs, and what runs again."""
 
+import json
 import os
 import re
 import subprocess
@@ -146,6 +147,17 @@ def test_a_tracking_server_that_is_down_does_not_stop_the_study(clone):
     done = clone.snakemake(VIEWBENCH_TRACKING_URI="http://127.0.0.1:9", MLFLOW_HTTP_REQUEST_MAX_RETRIES="0")
     assert done.returncode == 0, done.stderr
     assert (clone.cells / "maxmin" / "0.02" / "0" / "metrics.json").is_file()
+
+
+def test_a_study_can_be_recorded(clone, tmp_path):
+    command = [sys.executable, "-m", "viewbench", "record", "results/mini", "--into", str(tmp_path / "kept")]
+    subprocess.run([*command, "--note", "by a test"], cwd=clone.folder, env=clone.environment, check=True)
+    kept = tmp_path / "kept" / "mini"
+    assert sorted(path.name for path in kept.iterdir()) == ["about.json", "psnr_over_ratio.png", "results.csv"]
+    about = json.loads((kept / "about.json").read_text(encoding="utf-8"))
+    assert about["notes"] == "by a test"
+    assert about["machine"]["cpus"] >= 1
+    assert about["versions"]["numba"]
 
 
 def test_a_wrong_study_is_one_sentence(clone):
