@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from viewbench.common.errors import UserError
+from viewbench.scenes.formats import _colmap_files
 from viewbench.scenes.types import OPENCV, Cameras, Points, Scene, Split
 
 WRITABLE = True
@@ -41,7 +42,7 @@ def read(root: Path) -> Scene:
     model = _model(root)
     if model is None:
         raise UserError(f"'{root}' has no COLMAP model: no cameras, images and points3D in sparse/0")
-    _check_counts(model)
+    _colmap_files.check(model)
     try:
         reconstruction = pycolmap.Reconstruction(model)
     except (RuntimeError, ValueError, IndexError, OSError, MemoryError) as error:
@@ -91,17 +92,6 @@ def read(root: Path) -> Scene:
 def _convention(root: Path, held: np.ndarray) -> dict[str, str]:
     """Mip-NeRF 360 and LLFF, which have poses_bounds.npy, test on every 8th image unless somebody says otherwise."""
     return {"holdout": "every:8"} if (root / "poses_bounds.npy").is_file() and not len(held) else {}
-
-
-def _check_counts(model: Path) -> None:
-    """Raises UserError for a binary file that says to hold more records than its size allows: pycolmap would loop."""
-    for name, record in (("cameras", 24), ("images", 64), ("points3D", 43)):
-        path = model / f"{name}.bin"
-        if path.is_file():
-            with open(path, "rb") as file:
-                count = int.from_bytes(file.read(8), "little")
-            if count * record + 8 > path.stat().st_size:
-                raise UserError(f"COLMAP model '{model}' cannot be read: {path.name} is cut short or no model file")
 
 
 def _held_out(model: Path, names: tuple[str, ...]) -> np.ndarray:

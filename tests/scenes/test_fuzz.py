@@ -3,7 +3,10 @@
 import contextlib
 import json
 import shutil
+from dataclasses import replace
 
+import numpy as np
+import pycolmap
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -12,6 +15,7 @@ from tests.scenes import test_rgbd
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.scenes.load import open_scene
+from viewbench.scenes.subset import write_scene
 
 SETTINGS = settings_file.load()
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
@@ -84,6 +88,39 @@ def test_any_bytes_in_the_files_of_other_formats(form, tmp_path):
         try:
             file.write_bytes(content if replace else original[: int(cut * len(original))] + content)
             survives(root)
+        finally:
+            file.write_bytes(original)
+
+    check()
+
+
+@pytest.mark.parametrize("form", ["bin", "txt"])
+def test_damaged_colmap_models(small_room, tmp_path, form):
+    """Bytes changed, and files cut, of a model with cameras, images, points, rigs and frames."""
+    room = open_scene(str(small_room), SETTINGS)
+    room = replace(room, points=replace(room.points, xyz=room.points.xyz[:50], rgb=room.points.rgb[:50]))
+    write_scene(room, np.arange(6), tmp_path / "model", "colmap")
+    folder = tmp_path / "model" / "sparse" / "0"
+    if form == "txt":
+        pycolmap.Reconstruction(folder).write_text(folder)
+        for path in folder.glob("*.bin"):
+            path.unlink()
+    files = sorted(path for path in folder.iterdir() if path.suffix == f".{form}")
+
+    @settings(QUICK, max_examples=100)
+    @given(
+        file=st.sampled_from(files),
+        changes=st.lists(st.tuples(st.integers(0, 500), st.integers(0, 255)), max_size=6),
+        cut=st.none() | st.integers(0, 300),
+    )
+    def check(file, changes, cut):
+        original = file.read_bytes()
+        damaged = bytearray(original)
+        for place, value in changes:
+            damaged[place % len(damaged)] = value
+        try:
+            file.write_bytes(damaged[:cut])
+            survives(tmp_path / "model")
         finally:
             file.write_bytes(original)
 
