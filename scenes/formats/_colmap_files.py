@@ -1,4 +1,4 @@
-"""Walks COLMAP's binary files to see that every count in them fits: pycolmap believes them, loops and runs out of memory.
+"""Walks COLMAP's binary files to see that every count in them fits: pycolmap believes them, and loops for minutes.
 
 The layouts are those of COLMAP's scene/reconstruction_io.cc: little-endian, a uint64 count, then the records.
 """

@@ -98,7 +98,10 @@ def _held_out(model: Path, names: tuple[str, ...]) -> np.ndarray:
     """Indices of the images that test.txt beside the model names. Raises UserError for a name that is not there."""
     if not (model / TEST).is_file():
         return np.zeros(0, dtype=np.int64)
-    listed = [line for line in (model / TEST).read_text(encoding="utf-8").split("\n") if line]
+    try:
+        listed = [line for line in (model / TEST).read_text(encoding="utf-8").split("\n") if line]
+    except UnicodeDecodeError:
+        raise UserError(f"'{model / TEST}' is no text file of image names") from None
     index = {name: i for i, name in enumerate(names)}
     unknown = [name for name in listed if name not in index]
     if unknown:
