@@ -40,6 +40,11 @@ def matrix(path: Path, what: str) -> np.ndarray:
     return values.reshape(4, 4)
 
 
+def natural(name: str) -> list[tuple[int, int, str]]:
+    """Sorting key that puts frame2 before frame10."""
+    return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", name)]
+
+
 def by_number(folder: Path, suffixes: Sequence[str]) -> list[Path]:
     """Files of the folder with one of the suffixes, in the order of the number in their names."""
     if not folder.is_dir():

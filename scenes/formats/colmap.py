@@ -1,6 +1,5 @@
 """COLMAP: sparse/0 in binary or text, images in images/ or images_2, images_4, images_8."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from viewbench.common.errors import UserError
 from viewbench.scenes.formats import _colmap_files
+from viewbench.scenes.formats._frames import image_size, natural
 from viewbench.scenes.types import OPENCV, Cameras, Points, Scene, Split
 
 WRITABLE = True
@@ -48,17 +48,21 @@ def read(root: Path) -> Scene:
     except (RuntimeError, ValueError, IndexError, OSError, MemoryError) as error:
         text = str(error).splitlines() or ["unreadable"]
         raise UserError(f"COLMAP model '{model}' cannot be read: {text[0]}") from None
-    images = sorted(
-        (image for image in reconstruction.images.values() if image.has_pose),
-        key=lambda image: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", image.name)],
-    )
+    try:
+        registered = [(natural(image.name), image) for image in reconstruction.images.values() if image.has_pose]
+    except UnicodeDecodeError:
+        raise UserError(f"COLMAP model '{model}' has an image name that is not UTF-8 text") from None
+    images = [image for _, image in sorted(registered, key=lambda pair: pair[0])]
     if not images:
         raise UserError(f"COLMAP model '{model}' has no registered image")
     folder = next((root / name for name in FOLDERS if (root / name).is_dir()), root / "images")
-    poses = np.stack([np.vstack([image.cam_from_world().matrix(), [0, 0, 0, 1]]) for image in images])
+    world_to_camera = np.stack([image.cam_from_world().matrix() for image in images])
+    turn = world_to_camera[:, :, :3].transpose(0, 2, 1)
+    poses = np.tile(np.eye(4), (len(images), 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = turn, -np.einsum("nij,nj->ni", turn, world_to_camera[:, :, 3])
     values = np.array([_intrinsics(reconstruction.cameras[image.camera_id]) for image in images])
     cameras = Cameras(
-        c2w=np.linalg.inv(poses) @ OPENCV,
+        c2w=poses @ OPENCV,
         fx=values[:, 0],
         fy=values[:, 1],
         cx=values[:, 2],
@@ -69,8 +73,6 @@ def read(root: Path) -> Scene:
     )
     names = tuple(image.name for image in images)
     if folder.name != "images":  # images_2, images_4, images_8: the model speaks of the full size
-        from viewbench.scenes.formats._frames import image_size
-
         cameras = cameras.scaled(image_size(folder / names[0])[0])
     every = Split(names, tuple(folder / name for name in names), cameras)
     held = _held_out(model, names)

@@ -1,11 +1,11 @@
 """A folder of images without poses, before any structure-from-motion: chosen by content, time and sharpness."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 
 from viewbench.common.errors import UserError
+from viewbench.scenes.formats._frames import image_size, natural
 from viewbench.scenes.subset import place_image
 from viewbench.scenes.types import Cameras, Scene, Split
 
@@ -30,11 +30,6 @@ def _images(root: Path) -> list[Path]:
     return []
 
 
-def natural(name: str) -> list[tuple[int, int, str]]:
-    """Sorting key that puts frame2 before frame10."""
-    return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", name)]
-
-
 def read(root: Path) -> Scene:
     """All images as training views, in natural order of their names, without times.
 
@@ -43,7 +38,7 @@ def read(root: Path) -> Scene:
     paths = _images(root)
     if len(paths) < 2:
         raise UserError(f"'{root}' has {len(paths)} images; a capture has at least two")
-    sizes = np.array([_size(path) for path in paths], dtype=np.int64)
+    sizes = np.array([image_size(path) for path in paths], dtype=np.int64)
     odd = np.flatnonzero((sizes != sizes[0]).any(axis=1))
     if len(odd):
         first, other = paths[0], paths[odd[0]]
@@ -76,16 +71,6 @@ def unposed(root: Path, name: str, frames: Split, files: tuple[Path, ...] = (), 
         posed=False,
         details=details,
     )
-
-
-def _size(path: Path) -> tuple[int, int]:
-    from PIL import Image
-
-    try:
-        with Image.open(path) as image:
-            return image.size
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise UserError(f"image '{path}' cannot be read: {error}") from None
 
 
 def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:

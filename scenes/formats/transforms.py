@@ -147,7 +147,7 @@ def _intrinsics(table: dict, name: str, path: Path, file: Path, sizes: dict[str,
         lens = [float(table.get(key, 0.0)) for key in ("k1", "k2", "p1", "p2")]
     except (TypeError, ValueError, ZeroDivisionError, OverflowError):
         raise UserError(f"'{file}': the intrinsics of frame '{name}' are no numbers") from None
-    if not all(map(math.isfinite, (width, height))) or max(width, height) > 1e6:
+    if not (1 <= width <= 1e6 and 1 <= height <= 1e6):
         raise UserError(f"'{file}': frame '{name}' is {width} x {height} pixels")
     return [fx, fy, cx, cy, width, height, *lens]
 

@@ -18,7 +18,9 @@ from viewbench.scenes.load import open_scene
 from viewbench.scenes.subset import write_scene
 
 SETTINGS = settings_file.load()
-QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+QUICK = settings(
+    derandomize=True, max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None
+)
 JSON = st.recursive(
     st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5) | st.just(1e400),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
