@@ -149,6 +149,13 @@ def test_a_tracking_server_that_is_down_does_not_stop_the_study(clone):
     assert (clone.cells / "maxmin" / "0.02" / "0" / "metrics.json").is_file()
 
 
+def test_without_a_target_everything_is_made(clone):
+    (clone.cells / "maxmin" / "0.02" / "0" / "metrics.json").unlink()
+    command = [sys.executable, "-m", "snakemake", "-n", "--config", "study=mini"]
+    done = subprocess.run(command, cwd=clone.folder, env=clone.environment, capture_output=True, text=True)
+    assert "evaluate room_human: maxmin" in done.stdout + done.stderr
+
+
 def test_a_study_can_be_recorded(clone, tmp_path):
     command = [sys.executable, "-m", "viewbench", "record", "results/mini", "--into", str(tmp_path / "kept")]
     subprocess.run([*command, "--note", "by a test"], cwd=clone.folder, env=clone.environment, check=True)

@@ -1,6 +1,5 @@
 # What is done with the finished cells.
 
-STAGES = ("selection", "train", "metrics")
 METRICS = expand(f"{RESULTS}/cells/{{cell}}/metrics.json", cell=CELLS.instance_patterns)
 
 
@@ -98,16 +97,3 @@ rule page:
         "put the page together"
     shell:
         "viewbench report {params.folder:q} --page > /dev/null 2> {log:q}"
-
-
-rule reports:
-    default_target: True
-    input:
-        f"{RESULTS}/reports/index.html",
-        f"{RESULTS}/tracked.json",
-        # Named here too, since Snakemake looks for a missing file only where a target asks for it.
-        expand(
-            f"{RESULTS}/cells/{{cell}}/{{file}}.json",
-            cell=CELLS.instance_patterns,
-            file=STAGES,
-        ),
