@@ -1,6 +1,7 @@
 """Opens a scene by name or path: finds its format, reads it, checks it and makes the test split."""
 
 import dataclasses
+import os
 from pathlib import Path
 
 from viewbench.common import plugins
@@ -39,7 +40,8 @@ def open_scene(
 
 def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
     if entry is None:
-        if Path(name).exists():
+        # os.path.exists, unlike Path.exists, takes any text for a name.
+        if os.path.exists(name):  # noqa: PTH110
             return Path(name)
         known = list(settings.scenes)
         raise UserError(
@@ -64,5 +66,7 @@ def detect(root: Path) -> str:
     for name in sorted(formats, key=lambda name: not getattr(formats[name], "POSED", True)):
         if formats[name].detect(root):
             return name
+    if root.is_file():
+        raise UserError(f"'{root}' is a file and no video; name the folder that the capture is in")
     known = ", ".join(plugins.names(FORMATS))
     raise UserError(f"'{root}' is in no known format ({known}); see `viewbench list formats`, or force one by --format")

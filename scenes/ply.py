@@ -27,11 +27,14 @@ def read_points(path: Path) -> Points:
 
 
 def write_points(path: Path, points: Points) -> None:
-    """Writes positions and colours as binary PLY, whole or not at all."""
+    """Writes positions and colours as binary PLY, whole or not at all; the 3DGS authors' reader insists on normals."""
     from plyfile import PlyData, PlyElement
 
-    layout = [*((axis, "<f4") for axis in "xyz"), *((name, "u1") for name in ("red", "green", "blue"))]
-    table = np.empty(len(points), dtype=layout)
+    layout = [
+        *((axis, "<f4") for axis in ("x", "y", "z", "nx", "ny", "nz")),
+        *((name, "u1") for name in ("red", "green", "blue")),
+    ]
+    table = np.zeros(len(points), dtype=layout)
     for k, axis in enumerate("xyz"):
         table[axis] = points.xyz[:, k]
     for k, name in enumerate(("red", "green", "blue")):

@@ -1,5 +1,6 @@
 """Writes the chosen part of a scene as a scene of a format, with selection.json beside it."""
 
+import filecmp
 import shutil
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 from viewbench.common import plugins
 from viewbench.common.errors import UserError
 from viewbench.common.files import whole_folder, write_json
+from viewbench.scenes.image_files import check_whole, is_file
 from viewbench.scenes.types import Scene
 
 
@@ -22,23 +24,10 @@ def write_subset(scene: Scene, selection: dict[str, Any], out: Path, copy: bool 
     written = scene.format if plugins.load("scenes.formats", scene.format).WRITABLE else "transforms"
     indices = np.asarray(selection["indices"], dtype=np.int64)
     if scene.format != "video":
-        for path in scene.train.subset(indices).paths:
-            check_image(path)
+        for path in (*scene.train.subset(indices).paths, *scene.test.paths):
+            check_whole(path)
     write_scene(scene, indices, out, written, copy, force, selection)
     return written
-
-
-def check_image(path: Path) -> None:
-    """Raises UserError for an image that is missing or whose data ends too early."""
-    from PIL import Image
-
-    try:
-        with Image.open(path) as image:
-            image.load()
-    except FileNotFoundError:
-        raise UserError(f"image '{path}' is missing") from None
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise UserError(f"image '{path}' cannot be read: {error}") from None
 
 
 def write_scene(
@@ -56,6 +45,15 @@ def write_scene(
         raise UserError(
             f"format '{format_name}' can be read and not written; write transforms or colmap (convert --to)"
         )
+    if (scene.format == "video") != (format_name == "video"):
+        raise UserError(
+            f"scene '{scene.name}' is in format {scene.format}; a video, and nothing else, is written by --to video"
+        )
+    if not scene.posed and getattr(module, "POSED", True):
+        raise UserError(f"scene '{scene.name}' has no poses, and format '{format_name}' needs them; run COLMAP on it")
+    lens = scene.train.lens or scene.test.lens
+    if lens and format_name != scene.format:
+        raise UserError(f"scene '{scene.name}' has {lens} cameras, which only its own format tells; undistort it first")
     if out.exists() and (not out.is_dir() or any(out.iterdir())) and not force:
         raise UserError(f"'{out}' exists and is not empty; name another folder or give --force")
     if out.resolve() == scene.root.resolve() or scene.root.resolve().is_relative_to(out.resolve()):
@@ -67,10 +65,17 @@ def write_scene(
 
 
 def place_image(source: Path, target: Path, copy: bool) -> None:
-    """Links (absolute, so that the folder can move) or copies one image. Raises UserError when it is missing."""
-    if not source.is_file():
+    """Links (absolute, so that the folder can move) or copies one image.
+
+    Raises UserError when it is missing, and when another frame's has been written to the same place.
+    """
+    if not is_file(source):
         raise UserError(f"image '{source}' is missing")
     target.parent.mkdir(parents=True, exist_ok=True)
+    if target.exists():
+        if filecmp.cmp(source, target, shallow=False):
+            return  # two frames, or two splits, share one image
+        raise UserError(f"image '{source}' and another frame's would both be written as '{target.name}'; rename one")
     if copy:
         shutil.copyfile(source, target)
     else:

@@ -26,7 +26,7 @@ class Cameras:
     cy: np.ndarray  # (N,) float64, pixels
     width: np.ndarray  # (N,) int64, pixels
     height: np.ndarray  # (N,) int64, pixels
-    distortion: np.ndarray | None = None  # (N, 4) float64, OpenCV's k1, k2, p1, p2; None where all are zero
+    distortion: np.ndarray | None = None  # (N, 5) float64, OpenCV's k1, k2, p1, p2, k3; None where all are zero
 
     def __len__(self) -> int:
         return len(self.c2w)
@@ -82,6 +82,7 @@ class Split:
     paths: tuple[Path, ...]  # image files
     cameras: Cameras
     times: np.ndarray | None = None  # (N,) float64 seconds, where the format has them
+    lens: str = ""  # camera model that is neither a pinhole nor OpenCV's: fit for selection, not for training
 
     def __len__(self) -> int:
         return len(self.names)
@@ -94,6 +95,7 @@ class Split:
             tuple(self.paths[i] for i in chosen),
             self.cameras[chosen],
             None if self.times is None else self.times[chosen],
+            self.lens,
         )
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from viewbench.common.errors import UserError
+from viewbench.scenes.image_files import image_size, is_file
 from viewbench.scenes.types import Scene, Split
 
 RIGID = 1e-3  # largest deviation of RᵀR from the identity; poses are often written with a few digits
@@ -30,9 +31,11 @@ def _check_split(scene: Scene, split: Split) -> None:
     bad = ~np.isfinite(cameras.c2w).all(axis=(1, 2))
     if bad.any():
         raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' has NaN or infinite entries")
-    gram = cameras.rotations.transpose(0, 2, 1) @ cameras.rotations
-    bad = np.abs(gram - np.eye(3)).max(axis=(1, 2), initial=0) > RIGID
-    bad |= np.linalg.det(cameras.rotations) < 0
+    with np.errstate(all="ignore"):  # huge numbers in a damaged file overflow, and are found so
+        gram = cameras.rotations.transpose(0, 2, 1) @ cameras.rotations
+        bad = ~(np.abs(gram - np.eye(3)).max(axis=(1, 2), initial=0) <= RIGID)
+        bad |= np.linalg.det(cameras.rotations) < 0
+    bad |= np.abs(cameras.c2w[:, 3] - [0, 0, 0, 1]).max(axis=1, initial=0) > RIGID
     if bad.any():
         raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' is no rigid motion")
     sizes = np.stack([cameras.fx, cameras.fy, cameras.width, cameras.height])
@@ -60,8 +63,19 @@ def _check_sizes(scene: Scene) -> None:
 
 
 def check_present(scene: Scene) -> None:
-    """Raises UserError for the first image of either split that is not there."""
+    """Raises UserError for the first image of either split that is missing, is no image or is not as big as the first.
+
+    Only the heads of the files are read.
+    """
+    first = None
     for split in (scene.train, scene.test):
         for name, path in zip(split.names, split.paths, strict=True):
-            if not path.is_file():
+            if not is_file(path):
                 raise UserError(f"scene '{scene.name}': the image of frame '{name}' is missing: '{path}'")
+            size = image_size(path)
+            first = first or size
+            if size != first:
+                raise UserError(
+                    f"scene '{scene.name}' mixes sizes: the image of frame '{name}' is {size[0]} x {size[1]}, "
+                    f"that of '{scene.train.names[0]}' {first[0]} x {first[1]}; resize the images to one size"
+                )

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from viewbench.common.errors import UserError
+from viewbench.scenes.image_files import image_size
 from viewbench.scenes.types import OPENCV, Cameras, Split
 
 
@@ -51,19 +52,6 @@ def by_number(folder: Path, suffixes: Sequence[str]) -> list[Path]:
         return []
     found = [path for path in folder.iterdir() if path.suffix.lower() in suffixes and path.is_file()]
     return sorted(found, key=lambda path: ([int(part) for part in re.findall(r"\d+", path.name)], path.name))
-
-
-def image_size(path: Path) -> tuple[int, int]:
-    """(width, height) in pixels. Raises UserError for a missing file and one that is no image."""
-    from PIL import Image
-
-    try:
-        with Image.open(path) as image:
-            return image.size
-    except FileNotFoundError:
-        raise UserError(f"image '{path}' is missing") from None
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise UserError(f"image '{path}' cannot be read: {error}") from None
 
 
 def split(

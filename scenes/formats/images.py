@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from viewbench.common.errors import UserError
-from viewbench.scenes.formats._frames import image_size, natural
+from viewbench.scenes.formats._frames import natural
+from viewbench.scenes.image_files import image_size
 from viewbench.scenes.subset import place_image
 from viewbench.scenes.types import Cameras, Scene, Split
 
@@ -74,7 +75,13 @@ def unposed(root: Path, name: str, frames: Split, files: tuple[Path, ...] = (), 
 
 
 def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
-    """Writes the chosen images to images/, and those held out, if any, to test/, under their own names."""
+    """Writes the chosen images to images/, and those held out, if any, to test/, under their files' names.
+
+    Raises UserError for two images of one name, which other formats keep in two folders.
+    """
     for folder, split in (("images", scene.train.subset(indices)), ("test", scene.test)):
-        for name, path in zip(split.names, split.paths, strict=True):
-            place_image(path, out / folder / Path(name).name, copy)
+        taken: dict[str, Path] = {}
+        for path in split.paths:
+            if taken.setdefault(path.name, path) is not path:
+                raise UserError(f"'{taken[path.name]}' and '{path}' have one name; write another format, or rename one")
+            place_image(path, out / folder / path.name, copy)

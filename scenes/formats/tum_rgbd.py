@@ -11,11 +11,11 @@ from viewbench.scenes.types import Scene
 WRITABLE = False
 FARTHEST_S = 0.02  # between a frame and its pose, as the data set's own tools
 CAMERA = "camera.txt"
-# fx, fy, cx, cy and OpenCV's k1, k2, p1, p2 that the data set publishes for its three cameras.
+# fx, fy, cx, cy and OpenCV's k1, k2, p1, p2, k3 that the data set publishes for its three cameras.
 CAMERAS = {
-    "freiburg1": (517.306408, 516.469215, 318.643040, 255.313989, 0.262383, -0.953104, -0.005358, 0.002628),
-    "freiburg2": (520.908620, 521.007327, 325.141442, 249.701764, 0.231222, -0.784899, -0.003257, -0.000105),
-    "freiburg3": (535.4, 539.2, 320.1, 247.6, 0.0, 0.0, 0.0, 0.0),
+    "freiburg1": (517.306408, 516.469215, 318.643040, 255.313989, 0.262383, -0.953104, -0.005358, 0.002628, 1.163314),
+    "freiburg2": (520.908620, 521.007327, 325.141442, 249.701764, 0.231222, -0.784899, -0.003257, -0.000105, 0.917205),
+    "freiburg3": (535.4, 539.2, 320.1, 247.6, 0.0, 0.0, 0.0, 0.0, 0.0),
 }
 
 
@@ -32,7 +32,7 @@ def read(root: Path) -> Scene:
     """Frames of rgb.txt that have a pose within 0.02 s, the nearest one; the others are dropped and counted.
 
     Raises UserError when no frame has a pose, and for a camera that neither the folder's name nor camera.txt
-    (fx fy cx cy, then k1 k2 p1 p2 if there are any) tells.
+    (fx fy cx cy, then k1 k2 p1 p2 k3 if there are any) tells.
     """
     stamps, paths = _listed(root)
     truth = numbers(root / "groundtruth.txt", "trajectory")
@@ -104,11 +104,11 @@ def _poses(rows: np.ndarray, file: Path) -> np.ndarray:
 def _camera(root: Path) -> tuple[float, ...]:
     if (root / CAMERA).is_file():
         values = numbers(root / CAMERA, "intrinsics").ravel().tolist()
-        if len(values) not in (4, 8):
-            raise UserError(f"intrinsics '{root / CAMERA}' have {len(values)} numbers, expected 4 or 8")
-        return tuple(values + [0.0] * (8 - len(values)))
+        if len(values) not in (4, 8, 9):
+            raise UserError(f"intrinsics '{root / CAMERA}' have {len(values)} numbers, expected 4, 8 or 9")
+        return tuple(values + [0.0] * (9 - len(values)))
     name = root.resolve().name
     for camera, known in CAMERAS.items():
         if camera in name:
             return known
-    raise UserError(f"the camera of '{root}' is not known: write fx fy cx cy [k1 k2 p1 p2] into '{root / CAMERA}'")
+    raise UserError(f"the camera of '{root}' is not known: write fx fy cx cy [k1 k2 p1 p2 [k3]] into '{root / CAMERA}'")

@@ -53,14 +53,21 @@ def _extract(root: Path, folder: Path) -> tuple[list[float], list[int]]:
     times: list[float] = []
     size = [0, 0]
     for number, frame in enumerate(_frames(root)):
-        size = [frame.width, frame.height]
-        image = frame.to_image()
+        image = _upright(frame)
+        size = list(image.size)
         image.thumbnail((SMALL, SMALL))
         image.save(folder / f"{frame_name(number)}.jpg", quality=92)
         times.append(float(frame.time) if frame.time is not None else float(number))
     if len(times) < 2:
         raise UserError(f"video '{root}' has {len(times)} frames that can be decoded; at least two are needed")
     return times, size
+
+
+def _upright(frame: Any) -> Any:
+    """The frame as an image, turned as a player turns it: telephones film on their side and say so in the file."""
+    image = frame.to_image()
+    turn = getattr(frame, "rotation", 0)  # degrees counter-clockwise; PyAV has it since 13
+    return image.rotate(turn, expand=True) if turn else image
 
 
 def _frames(root: Path) -> Iterator[Any]:
@@ -79,14 +86,14 @@ def _frames(root: Path) -> Iterator[Any]:
 
 
 def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
-    """Decodes the video once more and writes the chosen frames at full size, as PNG, to images/."""
-    wanted = {scene.train.names[i] for i in indices}
-    (out / "images").mkdir()
-    left = len(wanted)
+    """Decodes the video once more and writes the chosen frames at full size, as PNG, to images/, test ones to test/."""
+    folders = {scene.train.names[i]: out / "images" for i in indices} | dict.fromkeys(scene.test.names, out / "test")
+    left = len(folders)
     for number, frame in enumerate(_frames(scene.root)):
         name = frame_name(number)
-        if name in wanted:
-            frame.to_image().save(out / "images" / f"{name}.png", compress_level=4)
+        if name in folders:
+            folders[name].mkdir(exist_ok=True)
+            _upright(frame).save(folders[name] / f"{name}.png", compress_level=4)
             left -= 1
             if not left:
                 break

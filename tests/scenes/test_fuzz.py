@@ -10,22 +10,35 @@ import pycolmap
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from tests.scenes import test_rgbd
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
+from viewbench.scenes.digest import scene_sha256
+from viewbench.scenes.formats.images import nominal_cameras
+from viewbench.scenes.image_files import check_whole, image_size
+from viewbench.scenes.images import load_images
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.subset import write_scene
+from viewbench.scenes.types import Split
+from viewbench.scenes.validate import check_present
 
 SETTINGS = settings_file.load()
 QUICK = settings(
     derandomize=True, max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None
 )
 JSON = st.recursive(
-    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5) | st.just(1e400),
+    st.none()
+    | st.booleans()
+    | st.floats()
+    | st.integers()
+    | st.text(max_size=5)
+    | st.sampled_from([1e400, 10**400, "\ud800", "a" * 300, "..", "/"]),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
     max_leaves=6,
 )
+KINDS = ["png", "jpg", "webp", "tif", "bmp"]
 KEYS = [
     "frames",
     "fl_x",
@@ -38,6 +51,11 @@ KEYS = [
     "file_path",
     "transform_matrix",
     "time",
+    "camera_model",
+    "k3",
+    "mask_path",
+    "train_filenames",
+    "val_filenames",
 ]
 
 
@@ -60,6 +78,10 @@ def test_any_value_in_transforms(room, small_room, key, value, deep):
     (table["frames"][1] if deep else table)[key] = value
     (room / "transforms_train.json").write_text(json.dumps(table))
     survives(room)
+    with contextlib.suppress(UserError):
+        scene = open_scene(str(room), SETTINGS)
+        check_present(scene)
+        scene_sha256(scene)
 
 
 @QUICK
@@ -69,6 +91,27 @@ def test_any_bytes_as_transforms_and_points(room, small_room, content, name):
         shutil.copy(small_room / file, room / file)
     (room / {"json": "transforms_train.json", "ply": "points3d.ply"}[name]).write_bytes(content)
     survives(room)
+
+
+@QUICK
+@given(
+    changes=st.lists(st.tuples(st.integers(0, 3000), st.integers(0, 255)), max_size=8), suffix=st.sampled_from(KINDS)
+)
+def test_damaged_images(tmp_path_factory, changes, suffix):
+    path = tmp_path_factory.mktemp("image") / f"a.{suffix}"
+    pixels = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
+    Image.fromarray(pixels).save(path)
+    damaged = bytearray(path.read_bytes())
+    for place, value in changes:
+        damaged[place % len(damaged)] = value
+    path.write_bytes(damaged)
+    for reader in (image_size, check_whole, lambda path: load_images(one_view(path), [0], 16)):
+        with contextlib.suppress(UserError):
+            reader(path)
+
+
+def one_view(path):
+    return Split((path.name,), (path,), nominal_cameras(np.array([[32, 24]])))
 
 
 @pytest.mark.parametrize("form", test_rgbd.FORMATS)

@@ -1,6 +1,7 @@
 """Captures without poses: a folder of images, and a video."""
 
 import json
+import struct
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from PIL import Image
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.scenes.load import open_scene
+from viewbench.scenes.subset import write_scene, write_subset
 from viewbench.selectors import _run
 from viewbench.workflow.commands import _main
 
@@ -123,6 +125,54 @@ def test_a_video_is_thinned_to_full_size_frames_with_their_numbers(video, tmp_pa
         with Image.open(path) as image:
             assert image.size == (64, 48)
             assert abs(np.asarray(image).mean() - 8 * number) < 6
+
+
+def test_frames_of_a_video_that_are_held_out_are_written_apart(video, tmp_path):
+    scene = open_scene(str(video), SETTINGS, holdout="every:10")
+    write_subset(scene, {"indices": [3]}, tmp_path / "out")
+    written = sorted(path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*.png"))
+    # frame 0 is held out, so that training view 3 is frame 4
+    assert written == ["images/frame_000004.png", *(f"test/frame_0000{n}0.png" for n in range(3))]
+
+
+def test_a_video_filmed_on_its_side_is_turned(tmp_path, monkeypatch):
+    """The file says: a quarter turn clockwise. The left of what was stored is then the top of what is seen."""
+    av = pytest.importorskip("av")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "upright.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        pixels = np.zeros((48, 64, 3), np.uint8)
+        pixels[:, :32] = 240
+        for _ in range(3):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")))
+        container.mux(stream.encode())
+    data = bytearray(path.read_bytes())
+    matrix = data.index(b"tkhd") + 4 + 40  # the box's version and flags, times, track, duration, layer, volume
+    data[matrix : matrix + 36] = struct.pack(">9i", 0, 1 << 16, 0, -1 << 16, 0, 0, 48 << 16, 0, 1 << 30)
+    path.write_bytes(data)
+    scene = open_scene(str(path), SETTINGS)
+    write_subset(scene, {"indices": [1]}, tmp_path / "out")
+    for file in (scene.train.paths[1], tmp_path / "out" / "images" / "frame_000001.png"):
+        with Image.open(file) as image:
+            seen = np.asarray(image.convert("L"))
+        assert seen.shape == (64, 48)
+        assert seen[:28].mean() > 200
+        assert seen[36:].mean() < 40
+
+
+@pytest.mark.parametrize("form", ["transforms", "colmap"])
+def test_poses_are_not_made_up(folder, tmp_path, form):
+    with pytest.raises(UserError, match="no poses"):
+        write_scene(open_scene(str(folder), SETTINGS), np.arange(3), tmp_path / "out", form)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_video_becomes_frames_and_nothing_becomes_a_video(video, folder, tmp_path):
+    for source, form in ((video, "images"), (folder, "video")):
+        with pytest.raises(UserError, match="--to video"):
+            write_scene(open_scene(str(source), SETTINGS), np.arange(3), tmp_path / "out", form)
 
 
 def test_a_broken_video_is_one_sentence(tmp_path, monkeypatch):

@@ -1,0 +1,97 @@
+"""Lens distortion: OpenCV's five parameters are read, taken out and written; other lenses are told, never ignored."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.scenes.test_rgbd import tum
+from tests.scenes.test_transforms import frames, opened, write
+from tests.scenes.test_written import colmap
+from viewbench.common.errors import UserError
+from viewbench.scenes.images import load_images
+from viewbench.scenes.subset import write_scene, write_subset
+
+K = [0.26, -0.95, -0.005, 0.003, 1.16]  # k1, k2, p1, p2, k3, about those of TUM's first camera
+
+
+def test_every_coefficient_is_taken_out(tmp_path):
+    """A smooth picture of the directions, drawn through OpenCV's formula, looks as a pinhole sees it."""
+    width, height, focal = 160, 120, 130.0
+
+    def picture(x, y):
+        return 0.5 + 0.2 * np.sin(6 * x + 1) + 0.2 * np.cos(5 * y)
+
+    grid = np.linspace(-0.75, 0.75, 401)
+    x, y = np.meshgrid(grid, grid)
+    k1, k2, p1, p2, k3 = K
+    r2 = x**2 + y**2
+    radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+    u = focal * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2)) + width / 2
+    v = focal * (y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y) + height / 2
+    from scipy.interpolate import LinearNDInterpolator
+
+    rows, columns = np.mgrid[:height, :width] + 0.5
+    seen = LinearNDInterpolator(np.stack([u.ravel(), v.ravel()], 1), picture(x, y).ravel())(columns, rows)
+    head = dict(zip(("k1", "k2", "p1", "p2", "k3"), K, strict=True))
+    folder = write(tmp_path, frames("a.png"), size=(width, height), fl_x=focal, **head)
+    Image.fromarray(np.round(255 * np.nan_to_num(seen)).astype(np.uint8)).save(folder / "a.png")
+    images, cameras = load_images(opened(folder).train, np.array([0]), None)
+    wanted = picture((columns - width / 2) / focal, (rows - height / 2) / focal)
+    assert cameras.distortion is None
+    error = np.abs(images[0, ..., 0] - wanted)[10:-10, 10:-10]
+    assert error.max() < 0.02
+
+
+def test_the_data_sets_own_cameras_have_all_their_coefficients(tmp_path):
+    root = tmp_path / "rgbd_dataset_freiburg1_room"
+    root.mkdir()
+    tum(root)
+    (root / "camera.txt").unlink()
+    distortion = opened(root).train.cameras.distortion
+    np.testing.assert_allclose(distortion[0], [0.262383, -0.953104, -0.005358, 0.002628, 1.163314])
+
+
+@pytest.mark.parametrize("count", [4, 5])
+def test_coefficients_survive_both_formats(tmp_path, count):
+    lens = [*K[:count], *[0.0] * (5 - count)]
+    head = dict(zip(("k1", "k2", "p1", "p2", "k3"), lens, strict=True))
+    scene = opened(write(tmp_path / "in", frames("a.png", "b.png"), fl_x=5, **head))
+    write_scene(scene, np.arange(2), tmp_path / "colmap", "colmap")
+    write_scene(opened(tmp_path / "colmap"), np.arange(2), tmp_path / "back", "transforms")
+    for folder in ("colmap", "back"):
+        np.testing.assert_allclose(opened(tmp_path / folder).train.cameras.distortion, [lens] * 2)
+
+
+@pytest.mark.parametrize(
+    ("model", "params"),
+    [
+        ("OPENCV_FISHEYE", [10, 11, 6, 4, 0.1, 0, 0, 0]),
+        ("SIMPLE_RADIAL_FISHEYE", [10, 6, 4, 0.1]),
+        ("FULL_OPENCV", [10, 11, 6, 4, 0, 0, 0, 0, 0, 0.2, 0, 0]),
+    ],
+)
+def test_a_capture_of_another_lens_is_thinned_and_not_trained_on(tmp_path, model, params):
+    folder = colmap(tmp_path / "in", ["a.png", "b.png", "c.png", "d.png"], model=model, params=params)
+    scene = opened(folder, holdout="every:2")
+    assert (scene.train.lens, scene.test.lens) == (model, model)
+    write_subset(opened(folder), {"indices": [2, 0]}, tmp_path / "out")
+    assert opened(tmp_path / "out").train.lens == model
+    with pytest.raises(UserError, match="undistort"):
+        load_images(scene.train, np.array([0]), None)
+    with pytest.raises(UserError, match=model):
+        write_scene(scene, np.arange(1), tmp_path / "other", "transforms")
+
+
+def test_a_panorama_is_refused(tmp_path):
+    folder = colmap(tmp_path / "in", ["a.png", "b.png"], model="EQUIRECTANGULAR", params=[12, 8])
+    with pytest.raises(UserError, match=r"EQUIRECTANGULAR.*no focal length"):
+        opened(folder)
+
+
+@pytest.mark.parametrize("head", [{"camera_model": "OPENCV_FISHEYE", "k1": 0.1}, {"is_fisheye": True}, {"k4": 0.1}])
+def test_so_is_one_in_transforms(tmp_path, head):
+    scene = opened(write(tmp_path / "in", frames("a.png", "b.png"), fl_x=5, **head))
+    write_subset(scene, {"indices": [1]}, tmp_path / "out")
+    assert opened(tmp_path / "out").train.lens
+    with pytest.raises(UserError, match="undistort"):
+        load_images(scene.train, np.array([0]), None)
