@@ -32,8 +32,9 @@ def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
             f"'{path}' has spherical harmonics of degree {gaussians.degree}, which the CPU rasteriser has not, and "
             f"gsplat is not available ({reason}); train with degree {CPU_DEGREE}"
         )
+    rendering = _module("splat.options").Rendering(near=NEAR, degree=gaussians.degree)
     model = _module("splat.ply").read(path)
-    yield from _module("splat.loop").draw(model, cameras, NEAR, 0.0, gaussians.degree)
+    yield from _module("splat.loop").draw(model, cameras, rendering)
 
 
 def _module(name: str) -> ModuleType:

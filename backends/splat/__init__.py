@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
-from viewbench.backends.splat.options import Options, defaults
+from viewbench.backends.splat.options import Options, Rendering, defaults
 from viewbench.common.errors import UserError
 from viewbench.common.files import read_json
 from viewbench.scenes.types import Cameras
@@ -48,10 +48,10 @@ def render(model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
 
     settings = read_json(model / "splat.json", "splat settings")
     try:
-        near, background, degree = float(settings["near"]), float(settings["background"]), int(settings["degree"])
+        rendering = Rendering(**{name: kind(settings[name]) for name, kind in Rendering.__annotations__.items()})
     except (KeyError, TypeError, ValueError):
         raise UserError(f"'{model / 'splat.json'}' is not what training wrote; train again") from None
-    return draw(ply.read(model / "model.ply"), cameras, near, background, degree)
+    return draw(ply.read(model / "model.ply"), cameras, rendering)
 
 
 __all__ = ["CAPABILITIES", "Options", "available", "render", "train", "version", "warm"]

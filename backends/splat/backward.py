@@ -5,9 +5,9 @@ import numpy as np
 from viewbench.backends.splat.kernels import HALF, ONE, TWO, ZERO, F, compiled, exp, sigmoid
 from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, ROWS, SH0, SH1
 from viewbench.backends.splat.projection import (
-    BLUR,
     C_0,
     C_1,
+    FAINTEST,
     FX,
     FY,
     HEIGHT,
@@ -24,7 +24,7 @@ from viewbench.backends.splat.projection import (
 
 
 @compiled
-def project_backward(g, n, cam, degree, first_slot, slots, pair_gradient, out):
+def project_backward(g, n, cam, degree, low_pass, antialias, first_slot, slots, pair_gradient, out):
     """Fills out (ROWS, N) for the first n Gaussians; those without pairs get zeros."""
     fx, fy = cam[FX], cam[FY]
     limit_x, limit_y = HALF * MARGIN * cam[WIDTH] / fx, HALF * MARGIN * cam[HEIGHT] / fy
@@ -49,7 +49,8 @@ def project_backward(g, n, cam, degree, first_slot, slots, pair_gradient, out):
         t0, t1, t2, t3, t4, t5 = jacobian_rows(cam, rz, u, v)
         u0, u1, u2 = t0 * m0 + t1 * m3 + t2 * m6, t0 * m1 + t1 * m4 + t2 * m7, t0 * m2 + t1 * m5 + t2 * m8
         u3, u4, u5 = t3 * m0 + t4 * m3 + t5 * m6, t3 * m1 + t4 * m4 + t5 * m7, t3 * m2 + t4 * m5 + t5 * m8
-        a, b, c = u0 * u0 + u1 * u1 + u2 * u2 + BLUR, u0 * u3 + u1 * u4 + u2 * u5, u3 * u3 + u4 * u4 + u5 * u5 + BLUR
+        sharp_a, b, sharp_c = u0 * u0 + u1 * u1 + u2 * u2, u0 * u3 + u1 * u4 + u2 * u5, u3 * u3 + u4 * u4 + u5 * u5
+        a, c = sharp_a + low_pass, sharp_c + low_pass
         inverse = ONE / (a * c - b * b)
         qa, qb, qc = c * inverse, -b * inverse, a * inverse
         # To the screen mean, ∂/∂µ = Q Σ s d, and to the covariance, -Q (∂/∂Q) Q with ∂/∂Q = -½ Σ s d dᵀ.
@@ -58,6 +59,14 @@ def project_backward(g, n, cam, degree, first_slot, slots, pair_gradient, out):
         x00, x01 = qa * ha + qb * hb, qa * hb + qb * hc
         x10, x11 = qb * ha + qc * hb, qb * hb + qc * hc
         by_a, by_b, by_c = -(x00 * qa + x01 * qb), -TWO * (x00 * qb + x01 * qc), -(x10 * qb + x11 * qc)
+        if antialias:
+            # sums[0] is the gradient by log α, so also by log of the factor, ½ log|U Uᵀ| - ½ log|Σ'|.
+            sharp = sharp_a * sharp_c - b * b
+            if sharp * inverse > FAINTEST:
+                sharper = ONE / sharp
+                by_a += HALF * sums[0] * (sharp_c * sharper - c * inverse)
+                by_b += sums[0] * b * (inverse - sharper)
+                by_c += HALF * sums[0] * (sharp_a * sharper - a * inverse)
         # To U, then to M = R diag(s) and to T = J W.
         g0, g1, g2 = TWO * by_a * u0 + by_b * u3, TWO * by_a * u1 + by_b * u4, TWO * by_a * u2 + by_b * u5
         g3, g4, g5 = TWO * by_c * u3 + by_b * u0, TWO * by_c * u4 + by_b * u1, TWO * by_c * u5 + by_b * u2

@@ -7,6 +7,7 @@ from viewbench.backends.splat.binning import TILE, fill_tiles, sort_visible
 from viewbench.backends.splat.kernels import F
 from viewbench.backends.splat.layout import ROWS
 from viewbench.backends.splat.loss import Planes, loss
+from viewbench.backends.splat.options import Rendering
 from viewbench.backends.splat.projection import EXTENT_COLUMNS, SPLAT_COLUMNS, project
 from viewbench.backends.splat.raster import PAIR_COLUMNS, render, render_backward
 
@@ -14,9 +15,10 @@ from viewbench.backends.splat.raster import PAIR_COLUMNS, render, render_backwar
 class Engine:
     """Renders and trains pictures of one size, for up to `capacity` Gaussians. Not for use by several threads."""
 
-    def __init__(self, capacity: int, width: int, height: int, near: float, background: float = 0.0):
-        self.width, self.height, self.near = width, height, F(near)
-        self.background = np.full(3, background, np.float32)
+    def __init__(self, capacity: int, width: int, height: int, rendering: Rendering):
+        self.width, self.height, self.degree = width, height, rendering.degree
+        self.near, self.low_pass, self.antialias = F(rendering.near), F(rendering.low_pass), bool(rendering.antialias)
+        self.background = np.full(3, rendering.background, np.float32)
         self.planes = Planes(width, height)
         self.padded, self.padded_gradient = self.planes.new(), self.planes.new()
         self.image = self.planes.view(self.padded)
@@ -42,10 +44,10 @@ class Engine:
         self.lists = np.zeros(pairs, np.int64)
         self.pair_gradient = np.zeros((pairs, PAIR_COLUMNS), np.float32)
 
-    def draw(self, gaussians: np.ndarray, camera: np.ndarray, degree: int) -> np.ndarray:
+    def draw(self, gaussians: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """(3, H, W) picture of all columns of `gaussians`; valid until the next call."""
         n = gaussians.shape[1]
-        project(gaussians, n, camera, degree, self.near, self.splats, self.extents)
+        project(gaussians, n, camera, self.degree, self.near, self.low_pass, self.antialias, self.splats, self.extents)
         visible = sort_visible(n, self.extents, self.order, self.scratch, self.keys, self.scratch_keys)
         while True:
             self.slots[:n] = 0
@@ -79,7 +81,7 @@ class Engine:
         )
         return self.image
 
-    def differentiate(self, gaussians: np.ndarray, camera: np.ndarray, degree: int) -> np.ndarray:
+    def differentiate(self, gaussians: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """(ROWS, capacity) gradient of what `image_gradient` was set to, for the picture that `draw` drew last."""
         render_backward(
             self.width,
@@ -94,7 +96,18 @@ class Engine:
             self.pair_gradient,
         )
         n = gaussians.shape[1]
-        project_backward(gaussians, n, camera, degree, self.first_slot, self.slots, self.pair_gradient, self.gradient)
+        project_backward(
+            gaussians,
+            n,
+            camera,
+            self.degree,
+            self.low_pass,
+            self.antialias,
+            self.first_slot,
+            self.slots,
+            self.pair_gradient,
+            self.gradient,
+        )
         return self.gradient
 
     def compare(self, target: np.ndarray, weight: float) -> float:
@@ -108,7 +121,6 @@ class Engine:
         moments: tuple[np.ndarray, np.ndarray],
         camera: np.ndarray,
         target: np.ndarray,
-        degree: int,
         rates: np.ndarray,
         number: int,
         ssim_weight: float,
@@ -116,9 +128,9 @@ class Engine:
         scale_weight: float = 0.0,
     ) -> float:
         """One step of training on one view; returns the loss. `number` counts from 1."""
-        self.draw(gaussians, camera, degree)
+        self.draw(gaussians, camera)
         value = self.compare(target, ssim_weight)
-        gradient = self.differentiate(gaussians, camera, degree)
+        gradient = self.differentiate(gaussians, camera)
         n = gaussians.shape[1]
         if opacity_weight or scale_weight:
             regularise(gaussians, n, gradient, F(opacity_weight), F(scale_weight))

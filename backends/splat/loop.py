@@ -1,5 +1,6 @@
 """The training loop: one random view a step, learning rates that fall over the budget, relocation now and then."""
 
+import dataclasses
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +10,7 @@ import numpy as np
 from viewbench.backends._types import Budget, Report, Trained, TrainingSet
 from viewbench.backends.splat import layout, ply
 from viewbench.backends.splat.engine import Engine
-from viewbench.backends.splat.options import Options
+from viewbench.backends.splat.options import Options, Rendering
 from viewbench.backends.splat.projection import camera_vectors
 from viewbench.backends.splat.relocate import relocate
 from viewbench.backends.splat.seeding import camera_extent, seed
@@ -33,17 +34,17 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
     _check(data)
     views, height, width, _ = data.images.shape
     rng = np.random.default_rng(seed_)
-    gaussians, seeding = seed(data, o.gaussians, o.points, rng, o.opacity, o.scale)
+    gaussians, seeding = seed(data, o, rng)
     extent = camera_extent(data)
-    near = o.near * extent
+    rendering = Rendering(o.near * extent, o.background, o.degree, o.low_pass, o.antialias)
     cameras = camera_vectors(data.cameras)
-    engine = Engine(gaussians.shape[1], width, height, near, o.background)
+    engine = Engine(gaussians.shape[1], width, height, rendering)
     targets = [engine.planes.target(image) for image in data.images]
     first_rates, last = _rates(o, extent)
     weights = o.opacity_weight / gaussians.shape[1], o.scale_weight / gaussians.shape[1]
     # A step on copies loads the kernels, which is set-up and not training.
     moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
-    engine.step(gaussians.copy(), moments, cameras[0], targets[0], o.degree, first_rates, 1, o.ssim, 1e-9, 1e-9)
+    engine.step(gaussians.copy(), moments, cameras[0], targets[0], first_rates, 1, o.ssim, 1e-9, 1e-9)
     state = State.load(out) or State(gaussians, np.zeros_like(gaussians), np.zeros_like(gaussians), rng)
     saved = began = time.perf_counter() - state.seconds
     while (share := _share(state.step, state.seconds, budget)) < 1:
@@ -57,7 +58,6 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
             (state.first, state.second),
             cameras[view],
             targets[view],
-            o.degree,
             rates,
             state.step,
             o.ssim,
@@ -72,7 +72,7 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
         paused = time.perf_counter()
         share = _share(state.step, state.seconds, budget)
         if share >= 1 or share * CURVE_POINTS >= len(state.curve) + 1:
-            point = _point(state, report, near, o)
+            point = _point(state, report, rendering)
             state.curve.append(point)
             decibels = point["test_psnr_db"]
             text = f"loss {point['loss']:.4f}" + (f", {decibels:.2f} dB" if decibels is not None else "")
@@ -83,7 +83,7 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
         began += time.perf_counter() - paused
     model = _finite(state.gaussians)
     ply.write(out / "model.ply", model)
-    write_json(out / "splat.json", {"near": near, "background": o.background, "degree": o.degree})
+    write_json(out / "splat.json", dataclasses.asdict(rendering))
     State.forget(out)
     return Trained(
         iterations=state.step,
@@ -103,16 +103,14 @@ def _check(data: TrainingSet) -> None:
         raise UserError("the training images have NaN or infinite pixels")
 
 
-def _point(state: State, report: Report, near: float, o: Options) -> dict[str, float | None]:
+def _point(state: State, report: Report, rendering: Rendering) -> dict[str, float | None]:
     """A point of the curve; the test views are looked at for it and for nothing else."""
     gaussians = _finite(state.gaussians)
     return {
         "step": state.step,
         "seconds": state.seconds,
         "loss": float(np.mean(state.losses)),
-        "test_psnr_db": report.probe(lambda asked: draw(gaussians, asked, near, o.background, o.degree))
-        if report.probe
-        else None,
+        "test_psnr_db": report.probe(lambda asked: draw(gaussians, asked, rendering)) if report.probe else None,
     }
 
 
@@ -124,14 +122,14 @@ def _finite(gaussians: np.ndarray) -> np.ndarray:
     return gaussians if good.all() else np.ascontiguousarray(gaussians[:, good])
 
 
-def draw(gaussians: np.ndarray, cameras: Cameras, near: float, background: float, degree: int) -> Iterator[np.ndarray]:
+def draw(gaussians: np.ndarray, cameras: Cameras, rendering: Rendering) -> Iterator[np.ndarray]:
     """Pictures (H, W, 3) in [0, 1] of the cameras, one after another."""
     engine: Engine | None = None
     for vector, camera in zip(camera_vectors(cameras), cameras, strict=True):
         size = int(camera.width[0]), int(camera.height[0])
         if engine is None or (engine.width, engine.height) != size:
-            engine = Engine(gaussians.shape[1], *size, near, background)
-        picture = engine.draw(gaussians, vector, degree)
+            engine = Engine(gaussians.shape[1], *size, rendering)
+        picture = engine.draw(gaussians, vector)
         yield np.ascontiguousarray(np.clip(picture, 0, 1).transpose(1, 2, 0))
 
 

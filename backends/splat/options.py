@@ -1,4 +1,4 @@
-"""What can be set of a training run, and to what it is set by default."""
+"""What can be set of a training run, and to what it is set by default; what a model must be drawn with."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -8,17 +8,21 @@ from typing import Any
 class Options:
     """Hyperparameters; rates are per step, those of positions times the cameras' extent."""
 
-    gaussians: int = 20000  # most primitives; scene points beyond it are sampled
-    points: str = "auto"  # where they start: auto, scene, selected, rays
+    gaussians: int = 28000  # most primitives; points beyond it are sampled
+    points: str = "auto"  # where they start: auto, scene, selected, sweep, rays
+    sweep: float = 0.3  # share of them that the plane sweep gives where the scene has points too
+    shell: int = 500  # of them lie on a sphere around everything
     degree: int = 1  # of spherical harmonics
-    opacity: float = 0.8  # at the start
-    scale: float = 0.6  # at the start, times the spacing of the points
-    rate_mean: float = 1e-3
-    rate_mean_end: float = 0.01  # share of rate_mean that is left at the end
-    rate_scale: float = 0.02
+    opacity: float = 0.4  # at the start, where the points are known
+    scale: float = 0.45  # at the start, times the spacing of the points
+    low_pass: float = 0.1  # pixels², variance of the filter on the screen
+    antialias: bool = True  # the filter keeps a splat's light: Mip-Splatting's; False is 3DGS's
+    rate_mean: float = 6e-4
+    rate_mean_end: float = 0.1  # share of rate_mean that is left at the end
+    rate_scale: float = 0.03
     rate_quaternion: float = 2e-3
-    rate_opacity: float = 0.025
-    rate_colour: float = 7e-3
+    rate_opacity: float = 0.05
+    rate_colour: float = 0.012
     rate_sh: float = 3e-3
     rate_end: float = 0.3  # share of the other rates that is left at the end
     ssim: float = 0.2
@@ -33,3 +37,14 @@ class Options:
 def defaults() -> dict[str, Any]:
     """Options by name."""
     return {item.name: item.default for item in fields(Options)}
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """What a model must be drawn with besides a camera; the defaults are those of 3DGS."""
+
+    near: float = 0.01  # near plane, scene units
+    background: float = 0.0  # grey level
+    degree: int = 1  # of spherical harmonics
+    low_pass: float = 0.3  # pixels²
+    antialias: bool = False

@@ -2,8 +2,12 @@
 
 A Gaussian with mean m and covariance Σ = M Mᵀ, M = R(q) diag(s), seen by a camera with world-to-camera rotation W and
 position t = W m + d, becomes a 2D Gaussian with mean (fx tx/tz + cx, fy ty/tz + cy) and covariance
-Σ' = U Uᵀ + 0.3 I, U = J W M, J the Jacobian of the perspective division at t. J is taken at a point clamped to 1.3
-times the field of view, as in 3DGS, since the linearisation explodes outside it.
+Σ' = U Uᵀ + f I, U = J W M, J the Jacobian of the perspective division at t and f the variance of the low-pass filter.
+J is taken at a point clamped to 1.3 times the field of view, as in 3DGS, since the linearisation explodes outside it.
+
+3DGS takes f = 0.3 pixels², which makes thin splats brighter than they are. With `antialias` the opacity is multiplied
+by sqrt(|U Uᵀ| / |Σ'|), the 2D filter of Mip-Splatting (Yu et al. 2024, Eq. 9), whose f = 0.1 is about the variance of
+a pixel's square.
 
 The colour is SH₀₀ c₀ + ½ plus the degree-1 terms in the direction from the camera, cut at 0. Directions do not carry
 gradient to the mean, which is what 3DGS's own kernels leave in and what makes no measurable difference here.
@@ -15,7 +19,7 @@ from viewbench.backends.splat.kernels import HALF, LOG2E, ONE, TWO, ZERO, F, com
 from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0, SH1, SH_C0, SH_C1
 from viewbench.scenes.types import OPENCV, Cameras
 
-BLUR = F(0.3)  # pixels², added to the diagonal of Σ': no splat is thinner than about a pixel
+FAINTEST = F(2.5e-5)  # of the squared factor that `antialias` multiplies opacities by
 MARGIN = F(1.3)  # of the half field of view, where J's point is clamped
 MIN_ALPHA_LOG2 = F(7.994353436858858)  # -log2(1/255): below it a splat is not drawn
 C_0, C_1 = F(SH_C0), F(SH_C1)
@@ -117,7 +121,7 @@ def colour(g, i, channel, degree, dx, dy, dz):
 
 
 @compiled
-def project(g, n, cam, degree, near, splats, extents):
+def project(g, n, cam, degree, near, low_pass, antialias, splats, extents):
     """Fills `splats` and `extents` for the first n Gaussians; what is not on the screen gets CUT < 0."""
     fx, fy, cx, cy, width, height = cam[FX], cam[FY], cam[CX], cam[CY], cam[WIDTH], cam[HEIGHT]
     limit_x, limit_y = HALF * MARGIN * width / fx, HALF * MARGIN * height / fy
@@ -126,10 +130,8 @@ def project(g, n, cam, degree, near, splats, extents):
         tx, ty, tz = to_camera(g, cam, i)
         if not tz > near:
             continue
-        opacity = sigmoid(g[LOGIT, i])
-        log2_opacity = np.log2(opacity)
-        cut = TWO * (log2_opacity + MIN_ALPHA_LOG2) / LOG2E
-        if not cut > ZERO:
+        log2_opacity = np.log2(sigmoid(g[LOGIT, i]))
+        if not log2_opacity > -MIN_ALPHA_LOG2:
             continue
         rz = ONE / tz
         w, x, y, z, _ = unit_quaternion(g, i)
@@ -142,10 +144,17 @@ def project(g, n, cam, degree, near, splats, extents):
         u3 = t[3] * m[0] + t[4] * m[3] + t[5] * m[6]
         u4 = t[3] * m[1] + t[4] * m[4] + t[5] * m[7]
         u5 = t[3] * m[2] + t[4] * m[5] + t[5] * m[8]
-        a = u0 * u0 + u1 * u1 + u2 * u2 + BLUR
+        a = u0 * u0 + u1 * u1 + u2 * u2
         b = u0 * u3 + u1 * u4 + u2 * u5
-        c = u3 * u3 + u4 * u4 + u5 * u5 + BLUR
+        c = u3 * u3 + u4 * u4 + u5 * u5
+        sharp = a * c - b * b
+        a, c = a + low_pass, c + low_pass
         determinant = a * c - b * b
+        if antialias:
+            log2_opacity += HALF * np.log2(max(sharp / determinant, FAINTEST))
+        cut = TWO * (log2_opacity + MIN_ALPHA_LOG2) / LOG2E
+        if not cut > ZERO:
+            continue
         px, py = fx * tx * rz + cx, fy * ty * rz + cy
         rx, ry = np.sqrt(cut * a), np.sqrt(cut * c)
         if not determinant > F(1e-12):

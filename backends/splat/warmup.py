@@ -4,20 +4,24 @@ import numpy as np
 
 from viewbench.backends.splat import layout
 from viewbench.backends.splat.engine import Engine
+from viewbench.backends.splat.options import Rendering
+from viewbench.backends.splat.plane_sweep import sweep
 from viewbench.backends.splat.projection import camera_vectors
 from viewbench.scenes.types import Cameras
 
 
 def compile_kernels() -> None:
-    """One step of training on one Gaussian: calls every kernel with the types that training calls them with."""
+    """One step of training on one Gaussian, and one sweep: every kernel, with the types that training calls it with."""
     one = np.ones(1)
     size = np.full(1, 16, np.int64)
     cameras = Cameras(np.eye(4)[None], 16 * one, 16 * one, 8 * one, 8 * one, size, size)
-    engine = Engine(4, 16, 16, 0.01)
+    engine = Engine(4, 16, 16, Rendering())
     gaussians = layout.empty(4)
     gaussians[layout.MEAN + 2] = -2
     gaussians[layout.LOGIT] = 1
     target = engine.planes.target(np.zeros((16, 16, 3), np.float32))
     rates = np.full(layout.ROWS, 1e-3, np.float32)
     moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
-    engine.step(gaussians, moments, camera_vectors(cameras)[0], target, 1, rates, 1, 0.2, 1e-3, 1e-3)
+    engine.step(gaussians, moments, camera_vectors(cameras)[0], target, rates, 1, 0.2, 1e-3, 1e-3)
+    picture = np.zeros((8, 8), np.float32)
+    sweep(picture, picture[None], np.zeros((1, 3, 4)), np.ones(1), picture.copy(), picture.copy())

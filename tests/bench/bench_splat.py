@@ -21,6 +21,7 @@ import numpy as np  # noqa: E402
 
 from viewbench.backends.splat import layout  # noqa: E402
 from viewbench.backends.splat.engine import Engine  # noqa: E402
+from viewbench.backends.splat.options import Rendering  # noqa: E402
 
 COUNTS, SIZES = (2_000, 10_000, 50_000, 200_000), (96, 128, 256, 512)
 
@@ -56,7 +57,7 @@ def measure(n: int, size: int, repeats: int) -> tuple[float, float, int]:
     gaussians, cam = cloud(n), camera(size)
     target = np.random.default_rng(1).uniform(0, 1, (size, size, 3)).astype(np.float32)
     rates = np.full(layout.ROWS, 1e-5, np.float32)
-    engine = Engine(n, size, size, 0.05)
+    engine = Engine(n, size, size, Rendering(0.05))
     planes = engine.planes.target(target)
     moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
     torch_step = TorchStep(gaussians, rates)
@@ -64,7 +65,7 @@ def measure(n: int, size: int, repeats: int) -> tuple[float, float, int]:
     ours, theirs = [], []
     for number in range(1, repeats + 2):  # the first of each is not counted
         began = time.perf_counter()
-        loss = engine.step(gaussians, moments, cam, planes, 1, rates, number, 0.2)
+        loss = engine.step(gaussians, moments, cam, planes, rates, number, 0.2)
         middle = time.perf_counter()
         other = torch_step(cam, torch_target)
         ours.append(middle - began)
@@ -92,9 +93,9 @@ def peak_memory(n: int, size: int) -> float:
 import sys, resource; sys.path.insert(0, {str(Path(__file__).resolve().parent)!r})
 import numpy as np, bench_splat as b
 from viewbench.backends.splat.engine import Engine
-g = b.cloud({n}); e = Engine({n}, {size}, {size}, 0.05); m = np.zeros_like(g), np.zeros_like(g)
+g = b.cloud({n}); e = Engine({n}, {size}, {size}, b.Rendering(0.05)); m = np.zeros_like(g), np.zeros_like(g)
 t = e.planes.target(np.zeros(({size}, {size}, 3), np.float32)); r = np.full(len(g), 1e-5, np.float32)
-for k in range(1, 4): e.step(g, m, b.camera({size}), t, 1, r, k, 0.2)
+for k in range(1, 4): e.step(g, m, b.camera({size}), t, r, k, 0.2)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
     return 1024 * float(subprocess.check_output([sys.executable, "-c", code], text=True))

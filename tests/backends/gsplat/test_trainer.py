@@ -203,6 +203,7 @@ def test_a_point_is_drawn_where_its_camera_sees_it(take_views):
 def test_models_look_the_same_in_the_cpu_backend(take_views, tmp_path):
     from viewbench.backends.splat import ply
     from viewbench.backends.splat.loop import draw
+    from viewbench.backends.splat.options import Rendering
 
     views = take_views(width=40)
     points = views.points
@@ -218,7 +219,7 @@ def test_models_look_the_same_in_the_cpu_backend(take_views, tmp_path):
     )
     _gaussian_ply.save(tmp_path / "model.ply", gaussians)
     renderer = Renderer(real.rasterization, "cpu", "black", 0.0)
-    ours = draw(ply.read(tmp_path / "model.ply"), views.cameras, NEAR, 0.0, 1)
+    ours = draw(ply.read(tmp_path / "model.ply"), views.cameras, Rendering(near=NEAR))
     theirs = renderer.images(renderer.parameters(gaussians), views.cameras, 1)
     for one, other in zip(ours, theirs, strict=True):
         assert psnr_db(one, other) > 40

@@ -4,10 +4,12 @@ import numpy as np
 import torch
 
 from viewbench.backends.splat import layout
+from viewbench.backends.splat.options import Rendering
 
 
-def render(gaussians: torch.Tensor, camera: np.ndarray, degree: int, near: float, background: float) -> torch.Tensor:
+def render(gaussians: torch.Tensor, camera: np.ndarray, how: Rendering) -> torch.Tensor:
     """(3, H, W) picture of (ROWS, N) float64 parameters for a 21-vector camera, blended exactly."""
+    degree, near = how.degree, how.near
     cam = torch.tensor(camera, dtype=torch.float64)
     rotation, translation, position = cam[:9].view(3, 3), cam[9:12], cam[16:19]
     fx, fy, cx, cy = cam[12:16]
@@ -33,7 +35,12 @@ def render(gaussians: torch.Tensor, camera: np.ndarray, degree: int, near: float
         [torch.stack([fx / depth, zero, -fx * u / depth], 1), torch.stack([zero, fy / depth, -fy * v / depth], 1)], 1
     )
     project = jacobian @ rotation
-    flat = project @ covariance @ project.transpose(1, 2) + 0.3 * torch.eye(2, dtype=torch.float64)
+    sharp = project @ covariance @ project.transpose(1, 2)
+    flat = sharp + how.low_pass * torch.eye(2, dtype=torch.float64)
+    opacity = torch.sigmoid(gaussians[layout.LOGIT])
+    if how.antialias:
+        kept = torch.linalg.det(sharp) / torch.linalg.det(flat)
+        opacity = opacity * kept.clamp(min=2.5e-5).sqrt()
     centre = torch.stack([fx * t[:, 0] / depth + cx, fy * t[:, 1] / depth + cy], 1)
 
     direction = (mean - position).detach()
@@ -53,10 +60,10 @@ def render(gaussians: torch.Tensor, camera: np.ndarray, degree: int, near: float
     pixel = torch.stack([columns.reshape(-1), rows_.reshape(-1)], 1)
     d = pixel[:, None] - centre[order][None]
     power = 0.5 * torch.einsum("pni,nij,pnj->pn", d, torch.linalg.inv(flat[order]), d)
-    alpha = torch.sigmoid(gaussians[layout.LOGIT, order])[None] * torch.exp(-power)
+    alpha = opacity[order][None] * torch.exp(-power)
     alpha = torch.where(alpha < 1 / 255, torch.zeros_like(alpha), alpha.clamp(max=0.99))
     left = torch.cumprod(torch.cat([torch.ones(len(pixel), 1, dtype=torch.float64), 1 - alpha], 1), 1)
-    picture = (alpha * left[:, :-1]) @ colour[order] + left[:, -1:] * background
+    picture = (alpha * left[:, :-1]) @ colour[order] + left[:, -1:] * how.background
     return picture.T.reshape(3, height, width)
 
 

@@ -7,6 +7,7 @@ import torch
 from tests.backends.splat import reference
 from viewbench.backends.splat import layout
 from viewbench.backends.splat.engine import Engine
+from viewbench.backends.splat.options import Rendering
 from viewbench.backends.splat.projection import camera_vectors
 from viewbench.scenes.types import Cameras
 
@@ -64,17 +65,21 @@ def off_screen(g):
 CASES = [None, behind, huge, tiny, opaque, thin, off_screen]
 
 
-def both(g, cam, degree, background, target, weight):
+NEAR = 0.05
+FILTERS = {"3dgs": {"low_pass": 0.3, "antialias": False}, "mip": {"low_pass": 0.1, "antialias": True}}
+
+
+def both(g, cam, how, target, weight):
     """(picture, loss, picture gradient, parameter gradient) of the kernels, and of the reference."""
     width, height = int(cam[19]), int(cam[20])
-    engine = Engine(g.shape[1], width, height, 0.05, background)
-    picture = engine.draw(g, cam, degree).copy()
+    engine = Engine(g.shape[1], width, height, how)
+    picture = engine.draw(g, cam).copy()
     value = engine.compare(engine.planes.target(target.transpose(1, 2, 0)), weight)
     gradient = engine.image_gradient.copy()
-    ours = picture, value, gradient, engine.differentiate(g, cam, degree).copy()
+    ours = picture, value, gradient, engine.differentiate(g, cam).copy()
 
     parameters = torch.tensor(g.astype(np.float64), requires_grad=True)
-    drawn = reference.render(parameters, cam, degree, 0.05, background)
+    drawn = reference.render(parameters, cam, how)
     lost = reference.loss(drawn, torch.tensor(target, dtype=torch.float64), weight)
     (by_picture,) = torch.autograd.grad(lost, drawn, retain_graph=True)
     lost.backward()
@@ -84,14 +89,15 @@ def both(g, cam, degree, background, target, weight):
 
 @pytest.mark.parametrize("degenerate", CASES, ids=lambda case: case.__name__ if case else "plain")
 @pytest.mark.parametrize(("n", "width", "height"), [(60, 40, 29), (200, 24, 35)])
-def test_picture_loss_and_gradients(degenerate, n, width, height):
+@pytest.mark.parametrize("low_pass", FILTERS)
+def test_picture_loss_and_gradients(degenerate, n, width, height, low_pass):
     rng = np.random.default_rng(n)
     g = cloud(n, rng)
     if degenerate:
         degenerate(g)
     cam = camera(width, height, rng)
     target = rng.uniform(0, 1, (3, height, width)).astype(np.float32)
-    ours, theirs = both(g, cam, 1, 0.3, target, 0.2)
+    ours, theirs = both(g, cam, Rendering(NEAR, 0.3, 1, **FILTERS[low_pass]), target, 0.2)
     # A pixel where alpha is within rounding of 1/255 is drawn by one and not by the other: worth 1/255 of a colour,
     # rare, and not counted in the quantiles. Tiles that are opaque stop at a transmittance of 1e-4.
     difference = np.abs(ours[0] - theirs[0])
@@ -105,12 +111,13 @@ def test_picture_loss_and_gradients(degenerate, n, width, height):
         assert error <= 1e-2 * scale + 1e-8, f"{name}: {error} of {scale}"
 
 
-def test_plain_gradients_are_exact_to_rounding():
+@pytest.mark.parametrize("low_pass", FILTERS)
+def test_plain_gradients_are_exact_to_rounding(low_pass):
     """Where no pixel sits on a threshold, kernels and reference agree to float32."""
     rng = np.random.default_rng(1)
     g, cam = cloud(40, rng), camera(40, 29, rng)
     target = rng.uniform(0, 1, (3, 29, 40)).astype(np.float32)
-    ours, theirs = both(g, cam, 1, 0.0, target, 0.2)
+    ours, theirs = both(g, cam, Rendering(NEAR, **FILTERS[low_pass]), target, 0.2)
     np.testing.assert_allclose(ours[2], theirs[2], atol=2e-5 * np.abs(theirs[2]).max())
     for first, last in GROUPS.values():
         scale = np.abs(theirs[3][first:last]).max()
@@ -120,7 +127,7 @@ def test_plain_gradients_are_exact_to_rounding():
 def test_degree_zero_leaves_the_other_coefficients_alone():
     rng = np.random.default_rng(2)
     g, cam = cloud(50, rng), camera(32, 32, rng)
-    ours, theirs = both(g, cam, 0, 0.0, rng.uniform(0, 1, (3, 32, 32)).astype(np.float32), 0.2)
+    ours, theirs = both(g, cam, Rendering(NEAR, degree=0), rng.uniform(0, 1, (3, 32, 32)).astype(np.float32), 0.2)
     assert np.abs(ours[0] - theirs[0]).max() < 0.02
     assert not ours[3][layout.SH1 :].any()
 
@@ -130,7 +137,7 @@ def test_degree_zero_leaves_the_other_coefficients_alone():
 def test_loss_of_any_picture(weight, size):
     rng = np.random.default_rng(3)
     height, width = size
-    engine = Engine(1, width, height, 0.1)
+    engine = Engine(1, width, height, Rendering())
     picture, target = (rng.uniform(0, 1, (3, height, width)).astype(np.float32) for _ in range(2))
     engine.image[:] = picture
     value = engine.compare(engine.planes.target(target.transpose(1, 2, 0)), weight)
@@ -145,20 +152,20 @@ def test_an_empty_view_is_background():
     g = cloud(10, np.random.default_rng(4))
     g[layout.LOGIT] = -20
     cam = camera(20, 20, np.random.default_rng(4))
-    engine = Engine(10, 20, 20, 0.05, 0.25)
-    assert (engine.draw(g, cam, 1) == 0.25).all()
+    engine = Engine(10, 20, 20, Rendering(NEAR, 0.25))
+    assert (engine.draw(g, cam) == 0.25).all()
     assert engine.pairs == 0
     engine.compare(engine.planes.target(np.zeros((20, 20, 3), np.float32)), 0.2)
-    assert not engine.differentiate(g, cam, 1).any()
+    assert not engine.differentiate(g, cam).any()
 
 
 def test_more_pairs_than_there_is_room_for():
     rng = np.random.default_rng(5)
     g, cam = cloud(40, rng), camera(64, 48, rng)
     g[7:10] += 3
-    roomy, tight = Engine(40, 64, 48, 0.05), Engine(40, 64, 48, 0.05)
+    roomy, tight = Engine(40, 64, 48, Rendering(NEAR)), Engine(40, 64, 48, Rendering(NEAR))
     tight._make_room(16)
-    np.testing.assert_array_equal(roomy.draw(g, cam, 1), tight.draw(g, cam, 1))
+    np.testing.assert_array_equal(roomy.draw(g, cam), tight.draw(g, cam))
 
 
 def test_splats_at_one_depth():
@@ -166,6 +173,19 @@ def test_splats_at_one_depth():
     rng = np.random.default_rng(6)
     g, cam = cloud(30, rng), camera(32, 32, rng)
     g[0:3] = g[0:3, :1]
-    engine = Engine(30, 32, 32, 0.05)
-    engine.draw(g, cam, 1)
+    engine = Engine(30, 32, 32, Rendering(NEAR))
+    engine.draw(g, cam)
     assert (engine.slots > 0).sum() == (engine.extents[:, 3] > 0).sum()
+
+
+def test_the_filter_keeps_a_small_splats_light():
+    """A splat that shrinks below a pixel loses light with its area: with Mip-Splatting's filter, not with 3DGS's."""
+    light = {name: [] for name in FILTERS}
+    cam = camera(32, 32, np.random.default_rng(7))
+    for shrink in (0, 1):
+        g = layout.empty(1)
+        g[7:10], g[10], g[11:14] = np.log(0.015) - shrink * np.log(2), 9, 1
+        for name, values in light.items():
+            values.append(Engine(1, 32, 32, Rendering(NEAR, **FILTERS[name])).draw(g, cam).sum())
+    assert light["mip"][0] / light["mip"][1] > 3
+    assert light["3dgs"][0] / light["3dgs"][1] < 1.3

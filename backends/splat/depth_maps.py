@@ -1,0 +1,151 @@
+"""Depths of the chosen views by plane sweep: which of them to believe, and what to put where there are none."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewbench.backends._types import TrainingSet
+from viewbench.backends.splat.neighbours import neighbours, visible
+from viewbench.backends.splat.plane_sweep import sweep
+from viewbench.scenes.types import Cameras
+
+SIDE = 64  # pixels: about the geometric mean of the sides of the pictures that are compared
+PLANES = 64
+VIEWS = 60  # at most so many views get depths, evenly chosen
+SOURCES = 4  # neighbours that a view is compared with
+LEAST_VALUE = 0.02  # of a neighbour that is of any use
+LEAST_SCORE = 0.7  # correlation of a depth that is believed
+WITNESSES, AGREEING = 8, 2  # of so many other views, so many must have found the same depth by themselves,
+TOLERANCE = 0.06  # relative
+LEAST_SURE = 0.02  # share of a view's depths that are believed, below which the others are not guessed from them
+WIDEST = 0.05, 20.0  # depths that are tried where the scene has no points, as multiples of the cameras' extent
+BEYOND_POINTS = 0.5, 3.0  # and where it has, as multiples of their nearest and farthest: mirrors and windows are deeper
+
+
+@dataclass(frozen=True)
+class DepthMaps:
+    """Depths of V views of h x w pixels."""
+
+    cameras: Cameras  # V, of the small pictures
+    images: np.ndarray  # (V, h, w, 3) float32
+    depth: np.ndarray  # (V, h, w) float32, scene units along the optical axis
+    sure: np.ndarray  # (V, h, w) bool: compares well, and other views agree
+    guessed: np.ndarray  # (V, h, w) bool: not sure, `depth` is that of the nearest sure pixel of the view
+
+    def points(self, which: np.ndarray, depth: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """(P, 3) positions and (P, 3) colours of flat pixel indices (P,), at their depths or at those given (P,)."""
+        view, row, column = np.unravel_index(which, self.depth.shape)
+        z = (self.depth[view, row, column] if depth is None else depth).astype(np.float64)
+        cameras = self.cameras
+        x = (column + 0.5 - cameras.cx[view]) / cameras.fx[view] * z
+        y = (row + 0.5 - cameras.cy[view]) / cameras.fy[view] * z
+        inside = np.stack([x, -y, -z], axis=1)
+        positions = np.einsum("pij,pj->pi", cameras.rotations[view], inside) + cameras.positions[view]
+        return positions, self.images[view, row, column].astype(np.float64)
+
+
+def depth_maps(data: TrainingSet, extent: float, rng: np.random.Generator) -> DepthMaps:
+    """Depth maps of the chosen views, all of them or VIEWS evenly chosen ones; `extent` in scene units."""
+    k, height, width, _ = data.images.shape
+    shrink = max(1, round(math.sqrt(height * width) / SIDE))
+    images = _shrunk(data.images, shrink)
+    cameras = _shrunk_cameras(data.cameras, shrink)
+    views = np.unique(np.linspace(0, k - 1, min(k, VIEWS)).round().astype(np.int64))
+    near, far = _range(data, extent)
+    depths = np.geomspace(near, far, PLANES)
+    grey = np.ascontiguousarray(images.mean(axis=-1, dtype=np.float32))
+    inner, w2c = _intrinsics(cameras), cameras.world_to_camera()
+    sources, value = neighbours(cameras, views, SOURCES, near, far, rng)
+    depth = np.zeros((len(views), *grey.shape[1:]), np.float32)
+    score = np.full(depth.shape, -1, np.float32)
+    for row, i in enumerate(views):
+        use = sources[row][value[row] > LEAST_VALUE]
+        if not len(use):
+            continue
+        relative = w2c[use] @ np.linalg.inv(w2c[i])
+        homographies = np.empty((len(use), 3, 4))
+        homographies[:, :, :3] = inner[use] @ relative[:, :3, :3] @ np.linalg.inv(inner[i])
+        homographies[:, :, 3] = np.einsum("sab,sb->sa", inner[use], relative[:, :3, 3])
+        sweep(grey[i], grey[use], homographies, depths, depth[row], score[row])
+    believed = DepthMaps(cameras[views], images[views], depth, score > LEAST_SCORE, np.zeros(depth.shape, bool))
+    believed.sure[:] &= _agreed(believed, near, far, rng)
+    _guess(believed)
+    return believed
+
+
+def _range(data: TrainingSet, extent: float) -> tuple[float, float]:
+    """Nearest and farthest depth to be tried."""
+    near, far = WIDEST[0] * extent, WIDEST[1] * extent
+    if data.points is not None:
+        xyz = data.points.xyz[np.isfinite(data.points.xyz).all(axis=1)]
+        xyz = xyz[:: max(1, len(xyz) // 2000)]
+        if len(xyz):
+            w2c = data.cameras.world_to_camera()
+            z = np.einsum("kb,nb->kn", w2c[:, 2, :3], xyz) + w2c[:, 2, 3:]
+            z = z[visible(xyz, w2c, data.cameras)]
+            if len(z) > 100:
+                first, last = np.quantile(z, [0.01, 0.99])
+                near, far = BEYOND_POINTS[0] * float(first), BEYOND_POINTS[1] * float(last)
+    return near, far
+
+
+def _agreed(maps: DepthMaps, near: float, far: float, rng: np.random.Generator) -> np.ndarray:
+    """(V, h, w) bool: pixels whose depth enough of the views that overlap most have found too."""
+    count, height, width = maps.depth.shape
+    if count < 2:
+        return np.zeros(maps.depth.shape, bool)
+    inner, w2c = _intrinsics(maps.cameras), maps.cameras.world_to_camera()
+    witnesses, _ = neighbours(maps.cameras, np.arange(count), WITNESSES, near, far, rng)
+    agreeing = np.zeros((count, height * width), np.int64)
+    for i in range(count):
+        candidates = np.flatnonzero(maps.sure[i])
+        positions, _ = maps.points(candidates + i * height * width)
+        for j in witnesses[i]:
+            seen = (positions @ w2c[j, :3, :3].T + w2c[j, :3, 3]) @ inner[j].T
+            z = np.where(seen[:, 2] > 1e-9, seen[:, 2], np.inf)
+            column, row = np.floor(seen[:, 0] / z), np.floor(seen[:, 1] / z)
+            inside = np.isfinite(z) & (column >= 0) & (row >= 0) & (column < width) & (row < height)
+            z = z[inside]
+            theirs = maps.depth[j, row[inside].astype(np.int64), column[inside].astype(np.int64)]
+            agreeing[i, candidates[inside]] += np.abs(theirs - z) < TOLERANCE * z
+    return (agreeing >= min(AGREEING, count - 1)).reshape(maps.depth.shape)
+
+
+def _guess(maps: DepthMaps) -> None:
+    """Gives pixels that are not sure the depth of the nearest that is, in views that have enough of these."""
+    from scipy.ndimage import distance_transform_edt
+
+    for depth, sure, guessed in zip(maps.depth, maps.sure, maps.guessed, strict=True):
+        if sure.mean() >= LEAST_SURE:
+            row, column = distance_transform_edt(~sure, return_distances=False, return_indices=True)
+            depth[:] = depth[row, column]
+            guessed[:] = ~sure
+
+
+def _intrinsics(cameras: Cameras) -> np.ndarray:
+    """(N, 3, 3)."""
+    inner = np.zeros((len(cameras), 3, 3))
+    inner[:, 0, 0], inner[:, 1, 1], inner[:, 2, 2] = cameras.fx, cameras.fy, 1
+    inner[:, 0, 2], inner[:, 1, 2] = cameras.cx, cameras.cy
+    return inner
+
+
+def _shrunk(images: np.ndarray, factor: int) -> np.ndarray:
+    """(K, H // factor, W // factor, 3) means of squares of pixels."""
+    k, height, width, _ = images.shape
+    h, w = height // factor, width // factor
+    return images[:, : h * factor, : w * factor].reshape(k, h, factor, w, factor, 3).mean(axis=(2, 4))
+
+
+def _shrunk_cameras(cameras: Cameras, factor: int) -> Cameras:
+    """Of those pictures; what is cut off at the right and below moves no centre."""
+    return Cameras(
+        cameras.c2w,
+        cameras.fx / factor,
+        cameras.fy / factor,
+        cameras.cx / factor,
+        cameras.cy / factor,
+        cameras.width // factor,
+        cameras.height // factor,
+    )
