@@ -8,17 +8,15 @@ from types import ModuleType
 import numpy as np
 
 from viewbench.backends import _gaussian_ply
-from viewbench.common.errors import UserError
 from viewbench.scenes.types import Cameras
 
 NEAR = 0.01  # scene units
-CPU_DEGREE = 1  # of the spherical harmonics that the CPU rasteriser has
 
 
 def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
     """(H, W, 3) float32 in [0, 1] on black, one for each camera: by gsplat where there is a GPU, else on the CPU.
 
-    Raises UserError for a file that is no such PLY, and without a GPU for colours that the CPU rasteriser has not.
+    Raises UserError for a file that is no such PLY.
     """
     gaussians = _gaussian_ply.load(path)
     gsplat = _module("gsplat").Gsplat()
@@ -27,11 +25,6 @@ def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
         renderer = _module("gsplat.renderer").Renderer(gsplat.rasterizer(), gsplat.device, "black", NEAR)
         yield from renderer.images(renderer.parameters(gaussians), cameras, gaussians.degree)
         return
-    if gaussians.degree > CPU_DEGREE:
-        raise UserError(
-            f"'{path}' has spherical harmonics of degree {gaussians.degree}, which the CPU rasteriser has not, and "
-            f"gsplat is not available ({reason}); train with degree {CPU_DEGREE}"
-        )
     rendering = _module("splat.options").Rendering(near=NEAR, degree=gaussians.degree)
     model = _module("splat.ply").read(path)
     yield from _module("splat.loop").draw(model, cameras, rendering)

@@ -2,11 +2,10 @@
 
 import numpy as np
 
+from viewbench.backends.splat.harmonics import MOST, colour, fill_basis
 from viewbench.backends.splat.kernels import HALF, ONE, TWO, ZERO, F, compiled, exp, sigmoid
-from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, ROWS, SH0, SH1
+from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0
 from viewbench.backends.splat.projection import (
-    C_0,
-    C_1,
     FAINTEST,
     FX,
     FY,
@@ -14,7 +13,6 @@ from viewbench.backends.splat.projection import (
     MARGIN,
     WIDTH,
     clamped,
-    colour,
     jacobian_rows,
     shape,
     to_camera,
@@ -25,13 +23,14 @@ from viewbench.backends.splat.projection import (
 
 @compiled
 def project_backward(g, n, cam, degree, low_pass, antialias, first_slot, slots, pair_gradient, out):
-    """Fills out (ROWS, N) for the first n Gaussians; those without pairs get zeros."""
+    """Fills out (rows, N) for the first n Gaussians; those without pairs get zeros."""
     fx, fy = cam[FX], cam[FY]
     limit_x, limit_y = HALF * MARGIN * cam[WIDTH] / fx, HALF * MARGIN * cam[HEIGHT] / fy
     sums = np.empty(9, np.float32)
+    basis, count = np.empty(MOST, np.float32), (degree + 1) * (degree + 1)
     for i in range(n):
         if slots[i] == 0:
-            for row in range(ROWS):
+            for row in range(g.shape[0]):
                 out[row, i] = ZERO
             continue
         sums[:] = ZERO
@@ -111,15 +110,11 @@ def project_backward(g, n, cam, degree, low_pass, antialias, first_slot, slots, 
         out[QUATERNION + 3, i] = (by_z - along * z) * inverse_length
         out[LOGIT, i] = sums[0] * (ONE - sigmoid(g[LOGIT, i]))
         dx, dy, dz = view_direction(g, cam, i)
+        fill_basis(degree, dx, dy, dz, basis)
         for channel in range(3):
-            by_colour = sums[6 + channel]
-            if not colour(g, i, channel, degree, dx, dy, dz) > ZERO:
-                by_colour = ZERO
-            out[SH0 + channel, i] = C_0 * by_colour
-            by_colour = C_1 * by_colour if degree > 0 else ZERO
-            out[SH1 + channel, i] = -dy * by_colour
-            out[SH1 + 3 + channel, i] = dz * by_colour
-            out[SH1 + 6 + channel, i] = -dx * by_colour
+            shown = colour(g, i, channel, count, basis) > ZERO
+            for k in range(count):
+                out[SH0 + 3 * k + channel, i] = basis[k] * sums[6 + channel] if shown else ZERO
 
 
 @compiled

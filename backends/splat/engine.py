@@ -5,7 +5,7 @@ import numpy as np
 from viewbench.backends.splat.backward import adam, project_backward, regularise
 from viewbench.backends.splat.binning import TILE, fill_tiles, sort_visible
 from viewbench.backends.splat.kernels import F
-from viewbench.backends.splat.layout import ROWS
+from viewbench.backends.splat.layout import rows
 from viewbench.backends.splat.loss import Planes, loss
 from viewbench.backends.splat.options import Rendering
 from viewbench.backends.splat.projection import EXTENT_COLUMNS, SPLAT_COLUMNS, project
@@ -37,7 +37,7 @@ class Engine:
         self.first_slot, self.slots = np.zeros(capacity, np.int64), np.zeros(capacity, np.int64)
         self.order, self.scratch = np.zeros(capacity, np.int64), np.zeros(capacity, np.int64)
         self.keys, self.scratch_keys = np.zeros(capacity, np.uint32), np.zeros(capacity, np.uint32)
-        self.gradient = np.zeros((ROWS, capacity), np.float32)
+        self.gradient = np.zeros((rows(self.degree), capacity), np.float32)
 
     def _make_room(self, pairs: int) -> None:
         self.slot_tile, self.slot_splat = np.zeros(pairs, np.int64), np.zeros(pairs, np.int64)
@@ -47,6 +47,9 @@ class Engine:
     def draw(self, gaussians: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """(3, H, W) picture of all columns of `gaussians`; valid until the next call."""
         n = gaussians.shape[1]
+        if len(gaussians) != len(self.gradient):
+            # The kernels do not check bounds.
+            raise ValueError(f"{len(gaussians)} rows of parameters, made for {len(self.gradient)}")
         project(gaussians, n, camera, self.degree, self.near, self.low_pass, self.antialias, self.splats, self.extents)
         visible = sort_visible(n, self.extents, self.order, self.scratch, self.keys, self.scratch_keys)
         while True:
@@ -82,7 +85,7 @@ class Engine:
         return self.image
 
     def differentiate(self, gaussians: np.ndarray, camera: np.ndarray) -> np.ndarray:
-        """(ROWS, capacity) gradient of what `image_gradient` was set to, for the picture that `draw` drew last."""
+        """(rows, capacity) gradient of what `image_gradient` was set to, for the picture that `draw` drew last."""
         render_backward(
             self.width,
             self.height,

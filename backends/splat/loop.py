@@ -31,7 +31,7 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
     Raises UserError for views that cannot be trained on and for a training that diverged.
     """
     o = Options(**options)
-    _check(data)
+    _check(data, o)
     views, height, width, _ = data.images.shape
     rng = np.random.default_rng(seed_)
     gaussians, seeding = seed(data, o, rng)
@@ -95,7 +95,9 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
     )
 
 
-def _check(data: TrainingSet) -> None:
+def _check(data: TrainingSet, o: Options) -> None:
+    if not 0 <= o.degree <= layout.HIGHEST:
+        raise UserError(f"degree={o.degree}: spherical harmonics have a degree from 0 to {layout.HIGHEST} here")
     views = len(data.images)
     if views < 2 and (data.points is None or not len(data.points)):
         raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
@@ -123,7 +125,8 @@ def _finite(gaussians: np.ndarray) -> np.ndarray:
 
 
 def draw(gaussians: np.ndarray, cameras: Cameras, rendering: Rendering) -> Iterator[np.ndarray]:
-    """Pictures (H, W, 3) in [0, 1] of the cameras, one after another."""
+    """Pictures (H, W, 3) in [0, 1] of the cameras, one after another; the degree is that of the Gaussians."""
+    rendering = dataclasses.replace(rendering, degree=layout.degree_of(gaussians))
     engine: Engine | None = None
     for vector, camera in zip(camera_vectors(cameras), cameras, strict=True):
         size = int(camera.width[0]), int(camera.height[0])
@@ -142,13 +145,13 @@ def _share(step: int, seconds: float, budget: Budget) -> float:
 
 def _rates(o: Options, extent: float) -> tuple[np.ndarray, np.ndarray]:
     """Rates per row at the start, and the factor to which each falls."""
-    rates = np.zeros(layout.ROWS)
-    last = np.full(layout.ROWS, o.rate_end)
+    rates = np.zeros(layout.rows(o.degree))
+    last = np.full(len(rates), o.rate_end)
     rates[layout.MEAN : layout.MEAN + 3] = o.rate_mean * extent
     last[layout.MEAN : layout.MEAN + 3] = o.rate_mean_end
     rates[layout.QUATERNION : layout.QUATERNION + 4] = o.rate_quaternion
     rates[layout.LOG_SCALE : layout.LOG_SCALE + 3] = o.rate_scale
     rates[layout.LOGIT] = o.rate_opacity
     rates[layout.SH0 : layout.SH0 + 3] = o.rate_colour
-    rates[layout.SH1 :] = o.rate_sh if o.degree else 0.0
+    rates[layout.SH1 :] = o.rate_sh
     return rates, last

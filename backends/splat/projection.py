@@ -9,20 +9,20 @@ J is taken at a point clamped to 1.3 times the field of view, as in 3DGS, since 
 by sqrt(|U Uᵀ| / |Σ'|), the 2D filter of Mip-Splatting (Yu et al. 2024, Eq. 9), whose f = 0.1 is about the variance of
 a pixel's square.
 
-The colour is SH₀₀ c₀ + ½ plus the degree-1 terms in the direction from the camera, cut at 0. Directions do not carry
+The colour is ½ plus the spherical harmonics in the direction from the camera, cut at 0. Directions do not carry
 gradient to the mean, which is what 3DGS's own kernels leave in and what makes no measurable difference here.
 """
 
 import numpy as np
 
+from viewbench.backends.splat.harmonics import MOST, colour, fill_basis
 from viewbench.backends.splat.kernels import HALF, LOG2E, ONE, TWO, ZERO, F, compiled, exp, inlined, sigmoid
-from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0, SH1, SH_C0, SH_C1
+from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, QUATERNION
 from viewbench.scenes.types import OPENCV, Cameras
 
 FAINTEST = F(2.5e-5)  # of the squared factor that `antialias` multiplies opacities by
 MARGIN = F(1.3)  # of the half field of view, where J's point is clamped
 MIN_ALPHA_LOG2 = F(7.994353436858858)  # -log2(1/255): below it a splat is not drawn
-C_0, C_1 = F(SH_C0), F(SH_C1)
 
 # A camera as kernels take it: 21 float32.
 ROTATION, TRANSLATION, FX, FY, CX, CY, POSITION, WIDTH, HEIGHT = 0, 9, 12, 13, 14, 15, 16, 19, 20
@@ -110,21 +110,12 @@ def view_direction(g, cam, i):
     return dx * inverse, dy * inverse, dz * inverse
 
 
-@inlined
-def colour(g, i, channel, degree, dx, dy, dz):
-    """Of one channel, before it is cut at 0."""
-    value = C_0 * g[SH0 + channel, i] + HALF
-    if degree > 0:
-        first = -dy * g[SH1 + channel, i] + dz * g[SH1 + 3 + channel, i] - dx * g[SH1 + 6 + channel, i]
-        value += C_1 * first
-    return value
-
-
 @compiled
 def project(g, n, cam, degree, near, low_pass, antialias, splats, extents):
     """Fills `splats` and `extents` for the first n Gaussians; what is not on the screen gets CUT < 0."""
     fx, fy, cx, cy, width, height = cam[FX], cam[FY], cam[CX], cam[CY], cam[WIDTH], cam[HEIGHT]
     limit_x, limit_y = HALF * MARGIN * width / fx, HALF * MARGIN * height / fy
+    basis, count = np.empty(MOST, np.float32), (degree + 1) * (degree + 1)
     for i in range(n):
         extents[i, CUT] = F(-1)
         tx, ty, tz = to_camera(g, cam, i)
@@ -167,8 +158,9 @@ def project(g, n, cam, degree, near, low_pass, antialias, splats, extents):
         extents[i, CUT], extents[i, HALF_WIDTH], extents[i, HALF_HEIGHT] = cut, rx, ry
         extents[i, DEPTH] = tz
         dx, dy, dz = view_direction(g, cam, i)
+        fill_basis(degree, dx, dy, dz, basis)
         splats[i, X], splats[i, Y] = px, py
         splats[i, A], splats[i, B], splats[i, C] = conic_a * (HALF * LOG2E), conic_b * LOG2E, conic_c * (HALF * LOG2E)
         splats[i, LOG2_OPACITY] = log2_opacity
         for channel in range(3):
-            splats[i, RED + channel] = max(colour(g, i, channel, degree, dx, dy, dz), ZERO)
+            splats[i, RED + channel] = max(colour(g, i, channel, count, basis), ZERO)

@@ -26,7 +26,7 @@ NEAR, FAR = 0.1, 1.2  # depths along rays where nothing is known, as shares of t
 
 
 def seed(data: TrainingSet, o: Options, rng: np.random.Generator) -> tuple[np.ndarray, dict[str, Any]]:
-    """(ROWS, N) parameters of the Gaussians at the start, and the record of where they come from.
+    """(rows, N) parameters of the Gaussians at the start, and the record of where they come from.
 
     `o.points` is "auto" (scene points, where there are at least 500, and plane sweep), "scene", "selected" (scene
     points whose track has at least two chosen views), "sweep" or "rays". Raises UserError when a source that was
@@ -61,7 +61,7 @@ def seed(data: TrainingSet, o: Options, rng: np.random.Generator) -> tuple[np.nd
         starts.append(Start(positions, colours, SHELL_OPACITY))
         scales = np.append(scales, np.full(shell_count, size))
     record["count"] = len(scales)
-    return _gaussians(starts, scales), record
+    return _gaussians(starts, scales, o.degree), record
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ class Start:
     opacity: float
 
 
-def _gaussians(starts: list[Start], scales: np.ndarray) -> np.ndarray:
-    gaussians = empty(len(scales))
+def _gaussians(starts: list[Start], scales: np.ndarray, degree: int) -> np.ndarray:
+    gaussians = empty(len(scales), degree)
     gaussians[MEAN : MEAN + 3] = np.concatenate([start.points for start in starts]).T
     gaussians[LOG_SCALE : LOG_SCALE + 3] = np.log(scales)
     opacity = np.concatenate([np.full(len(start.points), start.opacity) for start in starts])

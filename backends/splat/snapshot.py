@@ -16,9 +16,9 @@ FILE = "snapshot.npz"
 class State:
     """Everything that a step changes."""
 
-    gaussians: np.ndarray  # (ROWS, N) float32
-    first: np.ndarray  # (ROWS, N) float32, Adam's mean of gradients
-    second: np.ndarray  # (ROWS, N) float32, Adam's mean of squared gradients
+    gaussians: np.ndarray  # (rows, N) float32
+    first: np.ndarray  # (rows, N) float32, Adam's mean of gradients
+    second: np.ndarray  # (rows, N) float32, Adam's mean of squared gradients
     rng: np.random.Generator
     step: int = 0
     seconds: float = 0.0

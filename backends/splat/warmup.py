@@ -16,11 +16,11 @@ def compile_kernels() -> None:
     size = np.full(1, 16, np.int64)
     cameras = Cameras(np.eye(4)[None], 16 * one, 16 * one, 8 * one, 8 * one, size, size)
     engine = Engine(4, 16, 16, Rendering())
-    gaussians = layout.empty(4)
+    gaussians = layout.empty(4, 1)
     gaussians[layout.MEAN + 2] = -2
     gaussians[layout.LOGIT] = 1
     target = engine.planes.target(np.zeros((16, 16, 3), np.float32))
-    rates = np.full(layout.ROWS, 1e-3, np.float32)
+    rates = np.full(len(gaussians), 1e-3, np.float32)
     moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
     engine.step(gaussians, moments, camera_vectors(cameras)[0], target, rates, 1, 0.2, 1e-3, 1e-3)
     picture = np.zeros((8, 8), np.float32)

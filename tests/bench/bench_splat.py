@@ -29,7 +29,7 @@ COUNTS, SIZES = (2_000, 10_000, 50_000, 200_000), (96, 128, 256, 512)
 def cloud(n: int) -> np.ndarray:
     """Gaussians that fill a cube about evenly, as large as their spacing."""
     rng = np.random.default_rng(0)
-    g = layout.empty(n)
+    g = layout.empty(n, 1)
     g[0:3] = rng.uniform(-1, 1, (3, n))
     g[3:7] = rng.normal(size=(4, n))
     g[7:10] = np.log(0.9 / np.cbrt(n)) + 0.4 * rng.normal(size=(3, n))
@@ -56,7 +56,7 @@ def measure(n: int, size: int, repeats: int) -> tuple[float, float, int]:
     torch.set_num_threads(1)
     gaussians, cam = cloud(n), camera(size)
     target = np.random.default_rng(1).uniform(0, 1, (size, size, 3)).astype(np.float32)
-    rates = np.full(layout.ROWS, 1e-5, np.float32)
+    rates = np.full(len(gaussians), 1e-5, np.float32)
     engine = Engine(n, size, size, Rendering(0.05))
     planes = engine.planes.target(target)
     moments = np.zeros_like(gaussians), np.zeros_like(gaussians)

@@ -1,14 +1,27 @@
 """The slow, obvious version: every Gaussian against every pixel in float64 torch, with automatic gradients."""
 
 import numpy as np
+import scipy.special
 import torch
 
 from viewbench.backends.splat import layout
 from viewbench.backends.splat.options import Rendering
 
 
+def basis(directions: np.ndarray, degree: int) -> np.ndarray:
+    """(N, (degree + 1)²) real spherical harmonics of unit vectors (N, 3), made of scipy's complex ones."""
+    x, y, z = directions.T
+    polar, azimuth = np.arccos(np.clip(z, -1, 1)), np.arctan2(y, x)
+    columns = []
+    for band in range(degree + 1):
+        for order in range(-band, band + 1):
+            value = scipy.special.sph_harm_y(band, abs(order), polar, azimuth)
+            columns.append(value.real if order == 0 else np.sqrt(2) * (value.imag if order < 0 else value.real))
+    return np.stack(columns, axis=1)
+
+
 def render(gaussians: torch.Tensor, camera: np.ndarray, how: Rendering) -> torch.Tensor:
-    """(3, H, W) picture of (ROWS, N) float64 parameters for a 21-vector camera, blended exactly."""
+    """(3, H, W) picture of (rows, N) float64 parameters for a 21-vector camera, blended exactly."""
     degree, near = how.degree, how.near
     cam = torch.tensor(camera, dtype=torch.float64)
     rotation, translation, position = cam[:9].view(3, 3), cam[9:12], cam[16:19]
@@ -45,11 +58,8 @@ def render(gaussians: torch.Tensor, camera: np.ndarray, how: Rendering) -> torch
 
     direction = (mean - position).detach()
     direction = direction / direction.norm(dim=1, keepdim=True)
-    colour = layout.SH_C0 * gaussians[layout.SH0 : layout.SH0 + 3].T + 0.5
-    if degree:
-        first = gaussians[layout.SH1 :].T.view(-1, 3, 3)  # coefficient, channel
-        basis = torch.stack([-direction[:, 1], direction[:, 2], -direction[:, 0]], 1)
-        colour = colour + layout.SH_C1 * torch.einsum("nk,nkc->nc", basis, first)
+    coefficients = gaussians[layout.SH0 :].T.view(gaussians.shape[1], -1, 3)[:, : (degree + 1) ** 2]
+    colour = 0.5 + torch.einsum("nk,nkc->nc", torch.tensor(basis(direction.numpy(), degree)), coefficients)
     colour = colour.clamp(min=0)
 
     order = torch.argsort(t[:, 2].detach())

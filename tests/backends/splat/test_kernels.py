@@ -26,14 +26,14 @@ def camera(width, height, rng):
     return camera_vectors(cameras)[0]
 
 
-def cloud(n, rng, spread=0.12):
-    g = layout.empty(n)
+def cloud(n, rng, spread=0.12, degree=1):
+    g = layout.empty(n, degree)
     g[0:3] = rng.uniform(-1, 1, (3, n))
     g[3:7] = rng.normal(size=(4, n))
     g[7:10] = np.log(spread) + 0.4 * rng.normal(size=(3, n))
     g[10] = 1.5 * rng.normal(size=n)
     g[11:14] = rng.normal(size=(3, n))
-    g[14:23] = 0.2 * rng.normal(size=(9, n))
+    g[14:] = 0.2 * rng.normal(size=g[14:].shape)
     return g
 
 
@@ -124,12 +124,24 @@ def test_plain_gradients_are_exact_to_rounding(low_pass):
         np.testing.assert_allclose(ours[3][first:last], theirs[3][first:last], atol=2e-4 * scale)
 
 
-def test_degree_zero_leaves_the_other_coefficients_alone():
+@pytest.mark.parametrize("degree", range(layout.HIGHEST + 1))
+def test_colours_of_every_degree(degree):
     rng = np.random.default_rng(2)
-    g, cam = cloud(50, rng), camera(32, 32, rng)
-    ours, theirs = both(g, cam, Rendering(NEAR, degree=0), rng.uniform(0, 1, (3, 32, 32)).astype(np.float32), 0.2)
+    g, cam = cloud(50, rng, degree=degree), camera(32, 32, rng)
+    target = rng.uniform(0, 1, (3, 32, 32)).astype(np.float32)
+    ours, theirs = both(g, cam, Rendering(NEAR, degree=degree), target, 0.2)
     assert np.abs(ours[0] - theirs[0]).max() < 0.02
-    assert not ours[3][layout.SH1 :].any()
+    assert len(ours[3]) == len(g) == layout.rows(degree)
+    assert layout.degree_of(g) == degree
+    for row in range(layout.SH0, len(g)):
+        scale = np.abs(theirs[3][row]).max()
+        np.testing.assert_allclose(ours[3][row], theirs[3][row], atol=2e-3 * scale)
+
+
+def test_parameters_of_another_degree_are_refused():
+    engine = Engine(5, 16, 16, Rendering(NEAR, degree=2))
+    with pytest.raises(ValueError, match="23 rows"):
+        engine.draw(cloud(5, np.random.default_rng(0)), camera(16, 16, np.random.default_rng(0)))
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.2, 1.0])
@@ -183,7 +195,7 @@ def test_the_filter_keeps_a_small_splats_light():
     light = {name: [] for name in FILTERS}
     cam = camera(32, 32, np.random.default_rng(7))
     for shrink in (0, 1):
-        g = layout.empty(1)
+        g = layout.empty(1, 1)
         g[7:10], g[10], g[11:14] = np.log(0.015) - shrink * np.log(2), 9, 1
         for name, values in light.items():
             values.append(Engine(1, 32, 32, Rendering(NEAR, **FILTERS[name])).draw(g, cam).sum())
