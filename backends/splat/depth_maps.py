@@ -11,9 +11,9 @@ from viewbench.backends.splat.plane_sweep import sweep
 from viewbench.scenes.types import Cameras
 
 SIDE = 64  # pixels: about the geometric mean of the sides of the pictures that are compared
-PLANES = 64
+PLANES = 48
 VIEWS = 60  # at most so many views get depths, evenly chosen
-SOURCES = 4  # neighbours that a view is compared with
+SOURCES = 3  # neighbours that a view is compared with
 LEAST_VALUE = 0.02  # of a neighbour that is of any use
 LEAST_SCORE = 0.7  # correlation of a depth that is believed
 WITNESSES, AGREEING = 8, 2  # of so many other views, so many must have found the same depth by themselves,
