@@ -78,8 +78,15 @@ def exp2_32(x):
 
 @inlined
 def exp(x):
-    """e^x for x in [-16, 5.5], clamped to it: scales of 1e-7 to 250 scene units."""
-    return F(256) * exp2_32(min(max(x * LOG2E, F(-24)), F(8)) - F(8))
+    """e^x for x in [-22, 22], clamped to it: scales of 2e-10 to 4e9 scene units. Relative error below 1.5e-5."""
+    t = (min(max(x * LOG2E, F(-32)), F(32)) - F(32)) * F(0.015625)
+    p = ((((C5 * t + C4) * t + C3) * t + C2) * t + C1) * t + C0
+    p = p * p
+    p = p * p
+    p = p * p
+    p = p * p
+    p = p * p
+    return p * p * F(4294967296)
 
 
 @inlined

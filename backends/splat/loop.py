@@ -31,10 +31,12 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
     Raises UserError for views that cannot be trained on and for a training that diverged.
     """
     o = Options(**options)
-    _check(data, o)
+    _check(data)
     views, height, width, _ = data.images.shape
     rng = np.random.default_rng(seed_)
     gaussians, seeding = seed(data, o, rng)
+    if views < 2 and not seeding["scene_points"]:
+        raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
     extent = camera_extent(data)
     rendering = Rendering(o.near * extent, o.background, o.degree, o.low_pass, o.antialias)
     cameras = camera_vectors(data.cameras)
@@ -95,12 +97,7 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
     )
 
 
-def _check(data: TrainingSet, o: Options) -> None:
-    if not 0 <= o.degree <= layout.HIGHEST:
-        raise UserError(f"degree={o.degree}: spherical harmonics have a degree from 0 to {layout.HIGHEST} here")
-    views = len(data.images)
-    if views < 2 and (data.points is None or not len(data.points)):
-        raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
+def _check(data: TrainingSet) -> None:
     if not np.isfinite(data.images).all():
         raise UserError("the training images have NaN or infinite pixels")
 

@@ -3,10 +3,15 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
+from viewbench.common.errors import UserError
+
 
 @dataclass(frozen=True)
 class Options:
-    """Hyperparameters; rates are per step, those of positions times the cameras' extent."""
+    """Hyperparameters; rates are per step, those of positions times the cameras' extent.
+
+    Raises UserError for a value out of its limits.
+    """
 
     gaussians: int = 28000  # most primitives; points beyond it are sampled
     points: str = "auto"  # where they start: auto, scene, selected, sweep, rays
@@ -29,9 +34,36 @@ class Options:
     opacity_weight: float = 0.0
     scale_weight: float = 0.0
     relocate_every: int = 100
-    relocate_until: float = 0.85  # share of the budget
+    relocate_until: float = 0.85  # share of the budget; 0 never relocates
     near: float = 0.05  # near plane, share of the cameras' extent
     background: float = 0.0  # grey level behind everything
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in LIMITS.items():
+            if not low <= getattr(self, name) <= high:
+                raise UserError(f"{name}={getattr(self, name)}: expected a value from {low} to {high}")
+
+
+LIMITS = {
+    "gaussians": (1, 10_000_000),
+    "sweep": (0, 1),
+    "shell": (0, 100_000),
+    "degree": (0, 3),
+    "opacity": (0.005, 0.99),
+    "scale": (1e-3, 1e3),
+    "low_pass": (0, 100),
+    **{
+        f"rate_{name}": (0, 10)
+        for name in ("mean", "mean_end", "scale", "quaternion", "opacity", "colour", "sh", "end")
+    },
+    "ssim": (0, 1),
+    "opacity_weight": (0, 100),
+    "scale_weight": (0, 100),
+    "relocate_every": (1, 10_000_000),
+    "relocate_until": (0, 1),
+    "near": (0, 1),
+    "background": (0, 1),
+}
 
 
 def defaults() -> dict[str, Any]:

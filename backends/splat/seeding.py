@@ -36,10 +36,6 @@ def seed(data: TrainingSet, o: Options, rng: np.random.Generator) -> tuple[np.nd
         raise UserError(
             f"unknown source of points '{o.points}'{nearest(o.points, SOURCES)} (known: {', '.join(SOURCES)})"
         )
-    if o.gaussians < 1 or o.shell < 0 or not 0 <= o.sweep <= 1:
-        raise UserError(
-            f"gaussians={o.gaussians}, shell={o.shell}, sweep={o.sweep}: expected at least 1, at least 0 and a share"
-        )
     extent = camera_extent(data)
     shell_count = min(o.shell, o.gaussians // 2)
     count = o.gaussians - shell_count
@@ -55,7 +51,7 @@ def seed(data: TrainingSet, o: Options, rng: np.random.Generator) -> tuple[np.nd
     used = [name for name in ("scene", "sweep", "ray") if record[f"{name}_points"]]
     record["source"] = " and ".join(used).replace("scene", "selected" if o.points == "selected" else "scene")
     points = np.concatenate([start.points for start in starts])
-    scales = o.scale * spacing(points)
+    scales = o.scale * np.maximum(spacing(points), 1e-6 * extent)
     if shell_count:
         positions, colours, size = shell(data, shell_count, extent)
         starts.append(Start(positions, colours, SHELL_OPACITY))
@@ -154,9 +150,21 @@ def along_rays(data: TrainingSet, count: int, extent: float, rng: np.random.Gene
 
 
 def camera_extent(data: TrainingSet) -> float:
-    """1.1 × the largest distance of a chosen camera from their middle (3DGS), at least a little."""
+    """1.1 × the largest distance of a chosen camera from their middle (3DGS), in scene units.
+
+    Cameras in one place say nothing of the scene's size: then the median distance of its points, or else 1.
+    """
     positions = data.cameras.positions
-    return max(1.1 * float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max()), 1e-3)
+    middle = positions.mean(axis=0)
+    extent = 1.1 * float(np.linalg.norm(positions - middle, axis=1).max())
+    if extent > 1e-6 * float(np.abs(middle).max()):
+        return extent
+    if data.points is not None:
+        distance = np.linalg.norm(data.points.xyz - middle, axis=1)
+        distance = distance[np.isfinite(distance) & (distance > 0)]
+        if len(distance):
+            return float(np.median(distance))
+    return 1.0
 
 
 def spacing(points: np.ndarray) -> np.ndarray:
@@ -164,6 +172,6 @@ def spacing(points: np.ndarray) -> np.ndarray:
     from scipy.spatial import cKDTree
 
     if len(points) < 4:
-        return np.full(len(points), 0.1)
+        return np.linalg.norm(points - points.mean(axis=0), axis=1)
     distance, _ = cKDTree(points).query(points, k=4)
-    return np.clip(np.sqrt((distance[:, 1:] ** 2).mean(axis=1)), 1e-5, None)
+    return np.sqrt((distance[:, 1:] ** 2).mean(axis=1))

@@ -134,8 +134,10 @@ def test_colours_of_every_degree(degree):
     assert len(ours[3]) == len(g) == layout.rows(degree)
     assert layout.degree_of(g) == degree
     for row in range(layout.SH0, len(g)):
-        scale = np.abs(theirs[3][row]).max()
-        np.testing.assert_allclose(ours[3][row], theirs[3][row], atol=2e-3 * scale)
+        # A pixel on the threshold of 1/255 may count for one Gaussian.
+        off = np.abs(ours[3][row] - theirs[3][row])
+        assert np.quantile(off, 0.9) < 1e-4 * np.abs(theirs[3][row]).max()
+        assert np.linalg.norm(off) < 0.1 * np.linalg.norm(theirs[3][row])
 
 
 def test_parameters_of_another_degree_are_refused():

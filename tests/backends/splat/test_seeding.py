@@ -86,7 +86,7 @@ def test_depths_that_are_believed_are_right(walk):
     assert maps.depth.shape == truth.shape  # small pictures are not made smaller
     error = np.abs(maps.depth - truth) / truth
     assert maps.sure.mean() > 0.2
-    assert np.quantile(error[maps.sure], 0.95) < 0.05
+    assert np.quantile(error[maps.sure], 0.95) < 0.07
     assert np.median(error[maps.guessed]) < 0.1
     positions, colours = maps.points(np.flatnonzero(maps.sure))
     assert np.quantile(on_walls(positions), 0.95) < 0.12
@@ -192,10 +192,39 @@ def test_a_few_scene_points_are_kept_beside_rays():
     assert (record["source"], record["scene_points"], record["ray_points"]) == ("scene and ray", 30, 2870)
 
 
-@pytest.mark.parametrize("changed", [{"gaussians": 0}, {"shell": -1}, {"sweep": 1.5}, {"sweep": float("nan")}])
-def test_counts_that_make_no_sense_are_refused(walk, changed):
-    with pytest.raises(UserError, match="expected"):
-        seed(walk[0], options(**changed), np.random.default_rng(0))
+@pytest.mark.parametrize(
+    "changed",
+    [{"gaussians": 0}, {"shell": -1}, {"sweep": float("nan")}, {"opacity": 1.0}, {"scale": 0.0}, {"degree": 4}],
+)
+def test_values_that_make_no_sense_are_refused(changed):
+    with pytest.raises(UserError, match=f"{next(iter(changed))}=.*expected a value from"):
+        Options(**changed)
+
+
+def test_every_number_has_limits():
+    from dataclasses import fields
+
+    from viewbench.backends.splat.options import LIMITS
+
+    assert set(LIMITS) == {item.name for item in fields(Options) if item.type in (int, float)}
+
+
+@pytest.mark.parametrize("factor", [1e-5, 1e5])
+def test_the_unit_of_length_does_not_matter(walk, factor):
+    """The same scene in millimetres: the same start, in millimetres."""
+    data, _ = walk
+    walls = np.random.default_rng(5).uniform(-HALF_ROOM, HALF_ROOM, (800, 3))
+    data = replace(data, points=Points(walls, np.full((800, 3), 128, np.uint8)))
+    poses = data.cameras.c2w.copy()
+    poses[:, :3, 3] *= factor
+    cameras_ = replace(data.cameras, c2w=poses)
+    larger = replace(data, cameras=cameras_, points=Points(walls * factor, data.points.rgb))
+    first, record = seed(data, options(), np.random.default_rng(0))
+    second, other = seed(larger, options(), np.random.default_rng(0))
+    assert record == other
+    scale = np.abs(first[MEAN : MEAN + 3]).max()
+    np.testing.assert_allclose(second[MEAN : MEAN + 3] / factor, first[MEAN : MEAN + 3], atol=1e-4 * scale)
+    np.testing.assert_allclose(second[7:10] - np.log(factor), first[7:10], atol=2e-3)
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 40])

@@ -141,6 +141,19 @@ def test_bad_input_is_refused(data, tmp_path):
     assert np.isfinite(ply.read(tmp_path / "nan" / "model.ply")).all()
 
 
+@pytest.mark.parametrize("factor", [1e-4, 1e4])
+def test_a_scene_in_other_units_trains_as_well(data, tmp_path, factor):
+    from dataclasses import replace
+
+    poses = data.cameras.c2w.copy()
+    poses[:, :3, 3] *= factor
+    points = Points(data.points.xyz * factor, data.points.rgb, data.points.seen_by)
+    scaled = replace(data, cameras=replace(data.cameras, c2w=poses), points=points)
+    run(data, tmp_path / "metres", 150, gaussians=500)
+    run(scaled, tmp_path / "scaled", 150, gaussians=500)
+    assert abs(score(tmp_path / "metres", data) - score(tmp_path / "scaled", scaled)) < 0.3
+
+
 def test_a_view_that_sees_nothing_is_harmless(data, tmp_path):
     from dataclasses import replace
 
