@@ -30,6 +30,7 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
 
     Raises UserError for views that cannot be trained on and for a training that diverged.
     """
+    entered = time.perf_counter()
     o = Options(**options)
     _check(data)
     views, height, width, _ = data.images.shape
@@ -47,6 +48,7 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
     # A step on copies loads the kernels, which is set-up and not training.
     moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
     engine.step(gaussians.copy(), moments, cameras[0], targets[0], first_rates, 1, o.ssim, 1e-9, 1e-9)
+    setup = time.perf_counter() - entered
     state = State.load(out) or State(gaussians, np.zeros_like(gaussians), np.zeros_like(gaussians), rng)
     saved = began = time.perf_counter() - state.seconds
     while (share := _share(state.step, state.seconds, budget)) < 1:
@@ -93,7 +95,7 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
         n_primitives=model.shape[1],
         seeding=seeding,
         curve=state.curve,
-        notes={"relocated": state.relocated},
+        notes={"relocated": state.relocated, "setup_seconds": setup},
     )
 
 

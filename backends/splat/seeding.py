@@ -48,8 +48,8 @@ def seed(data: TrainingSet, o: Options, rng: np.random.Generator) -> tuple[np.nd
     if o.points in ("auto", "sweep", "rays") and known < min(FEWEST, count):
         starts.append(Start(*along_rays(data, count - known, extent, rng), RAY_OPACITY))
         record["ray_points"] = count - known
-    used = [name for name in ("scene", "sweep", "ray") if record[f"{name}_points"]]
-    record["source"] = " and ".join(used).replace("scene", "selected" if o.points == "selected" else "scene")
+    names = {"scene": "selected" if o.points == "selected" else "scene", "sweep": "sweep", "ray": "rays"}
+    record["source"] = " and ".join(name for kind, name in names.items() if record[f"{kind}_points"])
     points = np.concatenate([start.points for start in starts])
     scales = o.scale * np.maximum(spacing(points), 1e-6 * extent)
     if shell_count:

@@ -59,3 +59,8 @@ def command(
     )
     primitives = "" if record["n_primitives"] is None else f", {record['n_primitives']} primitives"
     click.echo(f"{record['iterations']} iterations in {record['seconds']:.1f} s{primitives}")
+    seeding = record["seeding"]
+    if seeding.get("source"):
+        click.echo(f"started from {seeding['count']} points by {seeding['source']}")
+    if seeding.get("fallback"):
+        click.echo(f"note: {seeding['fallback']}")

@@ -138,7 +138,7 @@ def test_every_source_is_counted(walk):
     walls[np.arange(800), np.arange(800) % 3] = HALF_ROOM
     tracks = tuple([np.array([0, 3, 6])] * 500 + [np.array([1])] * 300)
     data = replace(data, points=Points(walls, np.full((800, 3), 128, np.uint8), tracks))
-    wanted = {"auto": "scene and sweep", "scene": "scene", "selected": "selected", "sweep": "sweep", "rays": "ray"}
+    wanted = {"auto": "scene and sweep", "scene": "scene", "selected": "selected", "sweep": "sweep", "rays": "rays"}
     for source, name in wanted.items():
         gaussians, record = seed(data, options(points=source), np.random.default_rng(0))
         assert record["source"] == name
@@ -179,7 +179,7 @@ def test_views_that_no_other_helps_are_seeded_too():
 def test_without_overlap_it_falls_back_and_says_so(points):
     data, _ = scattered(4)
     gaussians, record = seed(data, options(points=points), np.random.default_rng(0))
-    assert record["source"] == "ray"
+    assert record["source"] == "rays"
     assert record["ray_points"] == 2900
     assert "fewer than 500" in record["fallback"]
     assert np.isfinite(gaussians).all()
@@ -189,7 +189,7 @@ def test_a_few_scene_points_are_kept_beside_rays():
     data, _ = scattered(4)
     few = Points(np.random.default_rng(0).uniform(-1, 1, (30, 3)), np.zeros((30, 3), np.uint8))
     _, record = seed(replace(data, points=few), options(), np.random.default_rng(0))
-    assert (record["source"], record["scene_points"], record["ray_points"]) == ("scene and ray", 30, 2870)
+    assert (record["source"], record["scene_points"], record["ray_points"]) == ("scene and rays", 30, 2870)
 
 
 @pytest.mark.parametrize(
@@ -240,7 +240,7 @@ def test_cameras_in_one_place_have_no_depth():
     """A tripod: no baseline, no sweep, and nothing that divides by nothing."""
     data, _ = room(np.zeros((6, 3)), np.linspace(0, 2, 6))
     gaussians, record = seed(data, options(points="sweep"), np.random.default_rng(0))
-    assert record["source"] == "ray"
+    assert record["source"] == "rays"
     assert np.isfinite(gaussians).all()
 
 
