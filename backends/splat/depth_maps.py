@@ -8,6 +8,7 @@ import numpy as np
 from viewbench.backends._types import TrainingSet
 from viewbench.backends.splat.neighbours import neighbours, visible
 from viewbench.backends.splat.plane_sweep import sweep
+from viewbench.backends.splat.shrink import cameras_shrunk, images_shrunk
 from viewbench.scenes.types import Cameras
 
 SIDE = 64  # pixels: about the geometric mean of the sides of the pictures that are compared
@@ -49,8 +50,8 @@ def depth_maps(data: TrainingSet, extent: float, rng: np.random.Generator) -> De
     """Depth maps of the chosen views, all of them or VIEWS evenly chosen ones; `extent` in scene units."""
     k, height, width, _ = data.images.shape
     shrink = max(1, round(math.sqrt(height * width) / SIDE))
-    images = _shrunk(data.images, shrink)
-    cameras = _shrunk_cameras(data.cameras, shrink)
+    images = images_shrunk(data.images, shrink)
+    cameras = cameras_shrunk(data.cameras, shrink)
     views = np.unique(np.linspace(0, k - 1, min(k, VIEWS)).round().astype(np.int64))
     near, far = _range(data, extent)
     depths = np.geomspace(near, far, PLANES)
@@ -129,23 +130,3 @@ def _intrinsics(cameras: Cameras) -> np.ndarray:
     inner[:, 0, 0], inner[:, 1, 1], inner[:, 2, 2] = cameras.fx, cameras.fy, 1
     inner[:, 0, 2], inner[:, 1, 2] = cameras.cx, cameras.cy
     return inner
-
-
-def _shrunk(images: np.ndarray, factor: int) -> np.ndarray:
-    """(K, H // factor, W // factor, 3) means of squares of pixels."""
-    k, height, width, _ = images.shape
-    h, w = height // factor, width // factor
-    return images[:, : h * factor, : w * factor].reshape(k, h, factor, w, factor, 3).mean(axis=(2, 4))
-
-
-def _shrunk_cameras(cameras: Cameras, factor: int) -> Cameras:
-    """Of those pictures; what is cut off at the right and below moves no centre."""
-    return Cameras(
-        cameras.c2w,
-        cameras.fx / factor,
-        cameras.fy / factor,
-        cameras.cx / factor,
-        cameras.cy / factor,
-        cameras.width // factor,
-        cameras.height // factor,
-    )

@@ -15,6 +15,7 @@ from viewbench.backends.splat.projection import camera_vectors
 from viewbench.backends.splat.relocate import relocate
 from viewbench.backends.splat.seeding import camera_extent, seed
 from viewbench.backends.splat.snapshot import State
+from viewbench.backends.splat.stages import Stage, halved
 from viewbench.common.errors import UserError
 from viewbench.common.files import write_json
 from viewbench.scenes.types import Cameras
@@ -33,21 +34,20 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
     entered = time.perf_counter()
     o = Options(**options)
     _check(data)
-    views, height, width, _ = data.images.shape
+    views = len(data.images)
     rng = np.random.default_rng(seed_)
     gaussians, seeding = seed(data, o, rng)
     if views < 2 and not seeding["scene_points"]:
         raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
     extent = camera_extent(data)
     rendering = Rendering(o.near * extent, o.background, o.degree, o.low_pass, o.antialias)
-    cameras = camera_vectors(data.cameras)
-    engine = Engine(gaussians.shape[1], width, height, rendering)
-    targets = [engine.planes.target(image) for image in data.images]
+    full = Stage(data.images, data.cameras, gaussians.shape[1], rendering)
+    coarse = halved(data, gaussians.shape[1], rendering) if o.coarse else None
     first_rates, last = _rates(o, extent)
     weights = o.opacity_weight / gaussians.shape[1], o.scale_weight / gaussians.shape[1]
     # A step on copies loads the kernels, which is set-up and not training.
     moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
-    engine.step(gaussians.copy(), moments, cameras[0], targets[0], first_rates, 1, o.ssim, 1e-9, 1e-9)
+    full.engine.step(gaussians.copy(), moments, full.cameras[0], full.targets[0], first_rates, 1, o.ssim, 1e-9, 1e-9)
     setup = time.perf_counter() - entered
     state = State.load(out) or State(gaussians, np.zeros_like(gaussians), np.zeros_like(gaussians), rng)
     saved = began = time.perf_counter() - state.seconds
@@ -57,11 +57,12 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
         view = state.order.pop()
         state.step += 1
         rates = (first_rates * last**share).astype(np.float32)
-        loss = engine.step(
+        stage = coarse if coarse and share < o.coarse else full
+        loss = stage.engine.step(
             state.gaussians,
             (state.first, state.second),
-            cameras[view],
-            targets[view],
+            stage.cameras[view],
+            stage.targets[view],
             rates,
             state.step,
             o.ssim,

@@ -22,6 +22,7 @@ class Options:
     scale: float = 0.45  # at the start, times the spacing of the points
     low_pass: float = 0.1  # pixels², variance of the filter on the screen
     antialias: bool = True  # the filter keeps a splat's light: Mip-Splatting's; False is 3DGS's
+    coarse: float = 0.5  # share of the budget that goes to pictures of half the size, where they are large enough
     rate_mean: float = 6e-4
     rate_mean_end: float = 0.1  # share of rate_mean that is left at the end
     rate_scale: float = 0.03
@@ -52,6 +53,7 @@ LIMITS = {
     "opacity": (0.005, 0.99),
     "scale": (1e-3, 1e3),
     "low_pass": (0, 100),
+    "coarse": (0, 1),
     **{
         f"rate_{name}": (0, 10)
         for name in ("mean", "mean_end", "scale", "quaternion", "opacity", "colour", "sh", "end")

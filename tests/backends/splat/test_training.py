@@ -8,7 +8,7 @@ from tests.backends.splat.test_kernels import cloud
 from viewbench.backends import splat
 from viewbench.backends._psnr import psnr_db
 from viewbench.backends._types import Budget, Report, TrainingSet
-from viewbench.backends.splat import layout, loop, ply
+from viewbench.backends.splat import layout, loop, ply, stages
 from viewbench.backends.splat.options import Rendering
 from viewbench.backends.splat.relocate import relocate
 from viewbench.backends.splat.snapshot import State
@@ -72,7 +72,9 @@ def test_same_seed_same_bytes(data, tmp_path):
     assert models["a"] != models["c"]
 
 
-def test_a_killed_run_ends_in_the_same_bytes(data, tmp_path, monkeypatch):
+@pytest.mark.parametrize("smallest", [1000, 8], ids=["full size", "half size first"])
+def test_a_killed_run_ends_in_the_same_bytes(data, tmp_path, monkeypatch, smallest):
+    monkeypatch.setattr(stages, "SMALLEST", smallest)
     run(data, tmp_path / "whole", 120)
     monkeypatch.setattr(loop, "SNAPSHOT_S", 0.0)
 
@@ -90,6 +92,35 @@ def test_a_killed_run_ends_in_the_same_bytes(data, tmp_path, monkeypatch):
     run(data, tmp_path / "killed", 120)
     assert (tmp_path / "killed" / "model.ply").read_bytes() == (tmp_path / "whole" / "model.ply").read_bytes()
     assert sorted(path.name for path in (tmp_path / "killed").iterdir()) == ["model.ply", "splat.json"]
+
+
+def test_pictures_of_half_the_size_come_first(data, tmp_path, monkeypatch):
+    monkeypatch.setattr(stages, "SMALLEST", 8)
+    sizes = []
+
+    def note(engine, *arguments, real=stages.Engine.step):
+        sizes.append(engine.width)
+        return real(engine, *arguments)
+
+    monkeypatch.setattr(stages.Engine, "step", note)
+    run(data, tmp_path, 100, coarse=0.25)
+    assert sizes[1:] == [SIZE // 2] * 25 + [SIZE] * 75  # the very first warms up
+    assert score(tmp_path, data) > 20
+
+
+def test_small_pictures_are_not_halved(data):
+    assert stages.halved(data, 10, Rendering()) is None
+
+
+def test_a_picture_of_half_the_size_is_of_the_same_things(data):
+    from viewbench.backends.splat.shrink import cameras_shrunk, images_shrunk
+
+    g = cloud(60, np.random.default_rng(0), spread=0.3)
+    whole = np.stack(list(loop.draw(g, data.cameras, Rendering())))
+    half = np.stack(list(loop.draw(g, cameras_shrunk(data.cameras, 2), Rendering())))
+    shrunk = images_shrunk(whole, 2)
+    right, shifted = np.abs(half - shrunk).mean(), np.abs(half - np.roll(shrunk, 1, axis=2)).mean()
+    assert right < 0.4 * shifted
 
 
 def test_a_broken_snapshot_is_as_none(data, tmp_path):
