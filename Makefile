@@ -11,13 +11,14 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test lint types pytest bench format clean
+.PHONY: help setup dev reports dashboard test lint types pytest bench quality format clean
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
 	@echo "make dashboard   MLflow over the runs just made, on http://127.0.0.1:5000"
 	@echo "make test        linters, type checks and tests"
 	@echo "make bench       timings, as ratios measured side by side"
+	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
 	@echo "make clean       leaves the clone as it was"
 
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -63,6 +64,9 @@ pytest: dev
 bench: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_selectors.py $(BENCH)
 	$(THREADS) $(BIN)/python tests/bench/bench_splat.py $(BENCH)
+
+quality: dev
+	$(THREADS) $(BIN)/python tests/bench/bench_quality.py $(BENCH)
 
 format: dev
 	$(BIN)/ruff check --fix

@@ -10,6 +10,7 @@ import torch
 from viewbench.backends.splat import layout
 
 TILE = 16
+SH_C1 = 0.4886025119029199  # of the spherical harmonics of degree 1
 
 
 class TorchStep:
@@ -66,7 +67,7 @@ class TorchStep:
             direction = torch.nn.functional.normalize((mean[keep] - cam[16:19]).detach(), dim=1)
             basis = torch.stack([-direction[:, 1], direction[:, 2], -direction[:, 0]], 1)
             first = torch.stack(row[14:23], 1)[keep].view(-1, 3, 3)
-            colour = colour + layout.SH_C1 * (basis[:, :, None] * first).sum(1)
+            colour = colour + SH_C1 * (basis[:, :, None] * first).sum(1)
         colour = colour.clamp(min=0)
         reach = (2 * torch.log(opacity * 255).clamp(min=0))[:, None] * torch.diagonal(flat, dim1=1, dim2=2)
         reach = reach.sqrt().detach()

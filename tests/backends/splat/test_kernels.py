@@ -203,3 +203,21 @@ def test_the_filter_keeps_a_small_splats_light():
             values.append(Engine(1, 32, 32, Rendering(NEAR, **FILTERS[name])).draw(g, cam).sum())
     assert light["mip"][0] / light["mip"][1] > 3
     assert light["3dgs"][0] / light["3dgs"][1] < 1.3
+
+
+def test_the_benchmarks_torch_step_does_the_same_work():
+    """`make bench` compares speeds, which says something where both do the same: a step on the same parameters."""
+    from tests.bench.torch_splat import TorchStep
+
+    rng = np.random.default_rng(8)
+    g, cam = cloud(80, rng), camera(40, 32, rng)
+    target = rng.uniform(0, 1, (32, 40, 3)).astype(np.float32)
+    rates = np.full(len(g), 1e-4, np.float32)
+    slow = TorchStep(g, rates)
+    losses = [slow(cam, torch.tensor(target.transpose(2, 0, 1).copy())) for _ in range(2)]
+    engine = Engine(80, 40, 32, Rendering(NEAR))
+    planes, moments = engine.planes.target(target), (np.zeros_like(g), np.zeros_like(g))
+    for number, wanted in enumerate(losses, start=1):
+        assert abs(engine.step(g, moments, cam, planes, rates, number, 0.2) - wanted) < 2e-4
+    updated = np.stack([row.detach().numpy() for row in slow.rows])
+    assert np.median(np.abs(updated - g)) < 2e-5

@@ -207,3 +207,13 @@ def test_relocation_hardly_changes_the_picture(data):
     assert np.abs(after - before).mean() < 0.02
     assert not moments[0][:, :30].any()
     assert (1 / (1 + np.exp(-g[10])) > 0.004).all()
+
+
+def test_the_settings_that_are_compared_are_settings():
+    from tests.bench.bench_quality import SETTINGS, options
+    from viewbench.backends.splat.options import Options
+
+    chosen = {name: Options(**options(text)) for name, text in SETTINGS.items()}
+    assert chosen["default"] == Options()
+    assert len(set(chosen.values())) == len(SETTINGS)
+    assert not chosen["plain"].antialias
