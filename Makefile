@@ -32,6 +32,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 
 $(VENV)/.installed-dev: $(VENV)/.installed
 	@$(PIP) -e '.[dev]'
+	@$(PIP) --no-deps nerfstudio==1.1.5
 	@$(BIN)/python -c 'import pytest, ruff, mypy, hypothesis'
 	@touch $@
 

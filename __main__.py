@@ -5,7 +5,7 @@ import sys
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs a command; a user's mistake ends in one line on stderr and exit status 2."""
-    from viewbench.workflow.commands import _main
+    from .workflow.commands import _main
 
     sys.exit(_main.run(arguments))
 

@@ -9,16 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from viewbench import __version__
-from viewbench.backends import _registry
-from viewbench.backends._metrics import lpips, lpips_weights, ssim
-from viewbench.backends._psnr import psnr_db
-from viewbench.common.errors import UserError
-from viewbench.common.files import finite_or_none, read_json, write_json
-from viewbench.common.settings import Settings
-from viewbench.scenes.images import load_images
-from viewbench.scenes.pictures import picture_name, save_png, to_uint8
-from viewbench.scenes.types import Scene
+from .. import __version__
+from ..common import plugins
+from ..common.errors import UserError
+from ..common.files import finite_or_none, read_json, sha256_file, write_json
+from ..common.settings import Settings
+from ..common.sources import code_sha256
+from ..scenes.digest import scene_sha256
+from ..scenes.images import load_images
+from ..scenes.pictures import picture_name, save_png, to_uint8
+from ..scenes.types import Scene
+from . import _registry
+from ._metrics import lpips, lpips_weights, ssim
+from ._psnr import psnr_db
 
 
 def evaluate(
@@ -32,13 +35,14 @@ def evaluate(
     """Renders every test view of `scene` at the model's training width, writes renders/NAME.png and `metrics.json`.
 
     Scores are of the 8-bit pictures that are written, so that anyone can repeat them from the files.
-    Raises UserError when the model is missing, was trained on another scene, or the scene has no test split.
+    Raises UserError when the model is missing or was altered, was trained on another scene or on this one when it was
+    different (another hold-out may have trained on what is scored now), or the scene has no test split.
     """
     train = read_json(model / "train.json", "training record")
-    if train.get("scene") != scene.name:
-        raise UserError(f"'{model}' was trained on scene '{train.get('scene')}', not on '{scene.name}'")
     if not len(scene.test):
         raise UserError(f"scene '{scene.name}' has no test views; make a test split with --holdout")
+    scene_hash = scene_sha256(scene)
+    check_model(model, train, scene, scene_hash)
     backend = _registry.load(train["backend"], settings)
     reason = backend.available()
     if reason:
@@ -77,10 +81,41 @@ def evaluate(
         **{metric: _mean([view[metric] for view in views]) for metric in ("psnr_db", "ssim", "lpips")},
         "seconds": time.perf_counter() - began,
         "views": views,
+        "scene_sha256": scene_hash,
+        "holdout": scene.holdout,
+        "train_sha256": sha256_file(model / "train.json"),
+        "lpips_sha256": None if weights is None else sha256_file(weights),
+        "code_sha256": code_of(train["backend"], backend, scene.format),
         "viewbench": __version__,
     }
     write_json(out / "metrics.json", record)
     return record
+
+
+def check_model(model: Path, train: dict[str, Any], scene: Scene, scene_hash: str) -> None:
+    """Raises UserError when the model was not trained on this scene as it is now, or its files are not as trained."""
+    if train.get("scene") != scene.name:
+        raise UserError(f"'{model}' was trained on scene '{train.get('scene')}', not on '{scene.name}'")
+    if train.get("scene_sha256") != scene_hash:
+        raise UserError(
+            f"'{model}' was trained on scene '{scene.name}' with holdout '{train.get('holdout')}' and hash "
+            f"{str(train.get('scene_sha256'))[:12]}, but now it has holdout '{scene.holdout}' and hash "
+            f"{scene_hash[:12]}; train again"
+        )
+    for name, sha256 in train["files"].items():
+        if not (model / name).is_file() or sha256_file(model / name) != sha256:
+            raise UserError(f"'{model / name}' is missing or not as training left it; train again")
+
+
+def code_of(backend_name: str, backend: Any, format_name: str) -> str:
+    """Hash of the source code that a score of this backend's models depends on."""
+    return code_sha256(*modules_of(backend_name, backend), plugins.source_name("scenes.formats", format_name))
+
+
+def modules_of(backend_name: str, backend: Any) -> tuple[str, ...]:
+    """Modules, without what they import, that a score depends on: `RENDERERS` of a backend are others that draw."""
+    family = plugins.source_name("backends", backend_name.split(":")[0])
+    return ("backends._evaluate", family, *getattr(backend, "RENDERERS", ()))
 
 
 def _mean(values: list[Any]) -> float | None:

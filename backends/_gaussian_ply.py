@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import whole
+from ..common.errors import UserError
+from ..common.files import whole
 
 
 @dataclass(frozen=True)

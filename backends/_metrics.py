@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
+from ..common.errors import UserError
 
 
 def ssim(image: np.ndarray, truth: np.ndarray) -> float:
@@ -67,7 +67,7 @@ def lpips(image: np.ndarray, truth: np.ndarray, weights: Path) -> float:
 def _lpips_model(weights: Path):
     import torch
 
-    from viewbench.common.torchvision_cpu import import_torchvision
+    from ..common.torchvision_cpu import import_torchvision
 
     import_torchvision()
     try:

@@ -7,8 +7,8 @@ from types import ModuleType
 
 import numpy as np
 
-from viewbench.backends import _gaussian_ply
-from viewbench.scenes.types import Cameras
+from ..scenes.types import Cameras
+from . import _gaussian_ply
 
 NEAR = 0.01  # scene units
 
@@ -28,6 +28,12 @@ def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
     rendering = _module("splat.options").Rendering(near=NEAR, degree=gaussians.degree)
     model = _module("splat.ply").read(path)
     yield from _module("splat.loop").draw(model, cameras, rendering)
+
+
+def ply_renderer() -> str:
+    """What `render_ply` draws with here."""
+    gsplat = _module("gsplat").Gsplat()
+    return gsplat.version() if gsplat.available() is None else "splat"
 
 
 def _module(name: str) -> ModuleType:

@@ -9,14 +9,15 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from viewbench.common.errors import UserError
+from ..common.errors import UserError
+from ._memory import Usage, watched
 
 KEPT = 4096  # bytes of a log's end in which its last line is looked for
 PR_SET_PDEATHSIG = 1  # of Linux' prctl: the signal that a process gets when its parent dies
 
 
-def run(command: Sequence[str], folder: Path, log: Path, what: str, timeout_s: float | None = None) -> None:
-    """Runs `command` in `folder` and appends what it prints to `log`.
+def run(command: Sequence[str], folder: Path, log: Path, what: str, timeout_s: float | None = None) -> Usage:
+    """Runs `command` in `folder`, appends what it prints to `log`, and returns how much memory it took.
 
     The program leads a process group of its own, which is killed whole when the time is up or the caller is stopped,
     so that none of its children goes on with a model that nobody waits for. Raises UserError, with the program's last
@@ -36,7 +37,8 @@ def run(command: Sequence[str], folder: Path, log: Path, what: str, timeout_s: f
         except OSError as error:
             raise UserError(f"{what}: '{command[0]}' cannot be run: {error.strerror or error}") from None
         try:
-            status = process.wait(timeout_s)
+            with watched(process.pid) as usage:
+                status = process.wait(timeout_s)
         except subprocess.TimeoutExpired:
             raise UserError(f"{what}: stopped after {timeout_s:g} s; allow more time or less work") from None
         finally:
@@ -44,6 +46,7 @@ def run(command: Sequence[str], folder: Path, log: Path, what: str, timeout_s: f
     if status != 0:
         ended = f"exit status {status}" if status > 0 else f"signal {signal.Signals(-status).name}"
         raise UserError(f"{what} failed with {ended}: {last_line(log) or 'it printed nothing'}")
+    return usage
 
 
 def last_line(log: Path) -> str:

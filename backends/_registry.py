@@ -3,8 +3,8 @@
 from types import ModuleType
 from typing import Any
 
-from viewbench.common import plugins
-from viewbench.common.settings import Settings
+from ..common import plugins
+from ..common.settings import Settings
 
 
 def names(settings: Settings) -> list[str]:

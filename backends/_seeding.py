@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.backends._types import TrainingSet
-from viewbench.common.errors import UserError, nearest
+from ..common.errors import UserError, nearest
+from ._types import TrainingSet
 
 SOURCES = ("scene", "selected", "random")
 LEAST_TRACK = 2  # views that triangulate a point
@@ -17,9 +17,10 @@ def seed_points(
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """(P, 3) float64 positions, (P, 3) uint8 colours, and what `train.json` says of them.
 
-    The points of a scene file were triangulated from all its views, so that `scene` tells a trainer more than the
-    chosen views do; `selected` keeps the points seen from at least two chosen views, and `random` draws `count` in a
-    box around the chosen cameras. Raises UserError for an unknown source and for one that the scene has no points for.
+    The points of a scene file were triangulated from all its training views, so that `scene` tells a trainer more than
+    the chosen views do, and the same of every choice; `random` draws `count` in a box around the training cameras, for
+    every choice the same too; `selected` keeps the points seen from at least two chosen views. Raises UserError for an
+    unknown source and for one that the scene has no points for.
     """
     if source not in SOURCES:
         raise UserError(f"unknown source of points '{source}'{nearest(source, SOURCES)} (known: {', '.join(SOURCES)})")
@@ -52,10 +53,10 @@ def seen(data: TrainingSet) -> np.ndarray:
 
 
 def random_box(data: TrainingSet, rng: np.random.Generator, count: int) -> np.ndarray:
-    """(count, 3) uniform positions in the bounding box of the chosen cameras, grown on every side.
+    """(count, 3) uniform positions in the bounding box of all training cameras, grown on every side.
 
-    The margin is a part of the box' longest edge; one view alone has none, and gets a box of 1 scene unit around it.
+    The margin is a part of the box' longest edge; cameras in one place have none, and get a box of 1 scene unit.
     """
-    low, high = data.cameras.positions.min(axis=0), data.cameras.positions.max(axis=0)
+    low, high = data.training.positions.min(axis=0), data.training.positions.max(axis=0)
     margin = MARGIN * float((high - low).max()) or 0.5
     return rng.uniform(low - margin, high + margin, (count, 3))

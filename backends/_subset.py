@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.common.errors import UserError, nearest
-from viewbench.common.files import write_json, write_text
-from viewbench.scenes.types import Cameras
+from ..common.errors import UserError, nearest
+from ..common.files import write_json, write_text
+from ..scenes.types import Cameras
 
 LAYOUTS = ("transforms", "colmap")
 POINTS = "points3d.ply"

@@ -1,26 +1,34 @@
-"""Trains one cell with any backend: reads the chosen views, keeps the budget honest and writes `train.json`."""
+"""Trains one cell with any backend: reads the chosen views, keeps the budget honest and writes `train.json`.
+
+`train.json` says what the model was made from: the hashes of the scene, of the choice and of the code, and those of
+the model's own files. `selection.json` is put beside it.
+"""
 
 import dataclasses
 import json
 import shutil
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from viewbench import __version__
-from viewbench.backends import _registry
-from viewbench.backends._psnr import psnr_db
-from viewbench.backends._types import Budget, Probe, Report, Trained, TrainingSet
-from viewbench.common.errors import UserError, nearest
-from viewbench.common.files import read_json, write_json
-from viewbench.common.provenance import commit, machine
-from viewbench.common.seeding import seed_of
-from viewbench.common.settings import Settings
-from viewbench.scenes.images import load_images
-from viewbench.scenes.types import Cameras, Scene
+from .. import __version__
+from ..common import plugins
+from ..common.errors import UserError, nearest
+from ..common.files import sha256_folder, write_json
+from ..common.provenance import commit, machine
+from ..common.seeding import seed_of
+from ..common.settings import Settings
+from ..common.sources import code_sha256
+from ..scenes.digest import scene_sha256
+from ..scenes.images import load_images
+from ..scenes.types import Cameras, Scene
+from ..selectors._selection import check_selection, selection_sha256
+from . import _registry
+from ._memory import peak_rss_bytes
+from ._psnr import psnr_db
+from ._types import Budget, Probe, Report, Trained, TrainingSet
 
 WORK = ".training"  # a killed run's folder: the next run of the same cell takes it up or clears it
 PROBE_VIEWS = 8  # test views behind the curve; enough for its shape, few enough to cost nothing
@@ -54,7 +62,8 @@ def train(
     _obeyed(backend_name, backend.CAPABILITIES, budget)
     if not scene.posed:
         raise UserError(f"'{scene.name}' has no poses to train with; run structure-from-motion (COLMAP) first")
-    indices = check_selection(selection, scene)
+    scene_hash = scene_sha256(scene)
+    indices = check_selection(selection, scene, scene_hash)
     views = scene.train.subset(indices)
     images, cameras = load_images(scene.train, indices, width)
     data = TrainingSet(
@@ -64,13 +73,18 @@ def train(
         images=images,
         points=scene.points,
         chosen=indices,
-        paths=views.paths,
+        training=scene.train.cameras if width is None else scene.train.cameras.scaled(width),
     )
-    cell_seed = seed_of("train", backend_name, scene.name, selection["selector"], len(indices), seed) % 2**31
+    # Neither selector nor count is in it: what is drawn beside the views (which of the scene's points, say) is then
+    # the same for every choice.
+    cell_seed = seed_of("train", backend_name, scene.name, seed) % 2**31
     asked = {
         "backend": backend_name,
         "scene": scene.name,
-        "names": list(views.names),
+        "scene_sha256": scene_hash,
+        "holdout": scene.holdout,
+        "selection_sha256": selection_sha256(selection),
+        "code_sha256": code_of(backend_name, scene.format),
         "seed": seed,
         "width": int(cameras.width[0]),
         "budget": dataclasses.asdict(budget),
@@ -88,40 +102,17 @@ def train(
         if isinstance(error, MemoryError):
             raise UserError(f"backend '{backend_name}' ran out of memory with {len(indices)} views") from None
         raise
-    record = _record(trained, asked, selection)
+    record = _record(trained, asked, selection, sha256_folder(work / "model"))
+    (out / "train.json").unlink(missing_ok=True)  # of an earlier run: its model is about to go
     for file in sorted((work / "model").iterdir()):
         target = out / file.name
         if target.is_dir():
             shutil.rmtree(target)
         file.replace(target)
+    write_json(out / "selection.json", selection)
     write_json(out / "train.json", record)
     shutil.rmtree(work, ignore_errors=True)
     return record
-
-
-def check_selection(selection: dict[str, Any], scene: Scene) -> np.ndarray:
-    """(K,) int64 indices of the selection into the scene's training split.
-
-    Raises UserError when the selection was made on another scene: other length, indices out of range, other names.
-    """
-    try:
-        indices = np.asarray(selection["indices"], dtype=np.int64)
-        n_views, names = int(selection["n_views"]), list(selection["names"])
-        selection["selector"], selection["seed"]
-    except (KeyError, TypeError, ValueError) as error:
-        raise UserError(f"the selection lacks or garbles {error}; make it with `viewbench select`") from None
-    if n_views != len(scene.train):
-        raise UserError(
-            f"the selection was made of {n_views} views, scene '{scene.name}' has {len(scene.train)}; select again"
-        )
-    if len(indices) == 0 or indices.min() < 0 or indices.max() >= n_views or len(set(indices.tolist())) != len(indices):
-        raise UserError(f"the selection's indices must be distinct and in [0, {n_views - 1}]; select again")
-    for index, name in zip(indices, names, strict=False):
-        if scene.train.names[index] != name:
-            raise UserError(
-                f"the selection calls view {index} '{name}', the scene '{scene.train.names[index]}'; select again"
-            )
-    return indices
 
 
 def _options(backend: str, known: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
@@ -173,7 +164,19 @@ def _probe(scene: Scene, width: int | None) -> Probe:
     return probe
 
 
-def _record(trained: Trained, asked: dict[str, Any], selection: dict[str, Any]) -> dict[str, Any]:
+def code_of(backend_name: str, format_name: str) -> str:
+    """Hash of the source code that a training by this backend, on a scene read from this format, depends on."""
+    return code_sha256(*modules_of(backend_name), plugins.source_name("scenes.formats", format_name))
+
+
+def modules_of(backend_name: str) -> tuple[str, str]:
+    """Modules, without what they import, that a training depends on."""
+    return "backends._train", plugins.source_name("backends", backend_name.split(":")[0])
+
+
+def _record(
+    trained: Trained, asked: dict[str, Any], selection: dict[str, Any], files: dict[str, str]
+) -> dict[str, Any]:
     return {
         "schema": 1,
         "backend": asked["backend"],
@@ -184,13 +187,16 @@ def _record(trained: Trained, asked: dict[str, Any], selection: dict[str, Any]) 
         "seconds": trained.seconds,
         "device": trained.device,
         "threads": trained.threads,
-        "peak_rss_bytes": peak_rss_bytes(),
+        "peak_rss_bytes": max(peak_rss_bytes(), trained.peak_rss_bytes or 0),
+        "peak_gpu_bytes": trained.peak_gpu_bytes,
         "n_primitives": trained.n_primitives,
         "seeding": trained.seeding,
         "curve": trained.curve,
         "scene": asked["scene"],
+        **{key: asked[key] for key in ("scene_sha256", "holdout", "selection_sha256", "code_sha256")},
+        "files": files,
         "selector": selection["selector"],
-        "count": len(asked["names"]),
+        "count": len(selection["indices"]),
         "width": asked["width"],
         "options": asked["options"],
         "notes": trained.notes,
@@ -198,19 +204,3 @@ def _record(trained: Trained, asked: dict[str, Any], selection: dict[str, Any]) 
         "commit": commit(),
         "viewbench": __version__,
     }
-
-
-def peak_rss_bytes() -> int:
-    """Largest resident set of this process so far, in bytes."""
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return int(peak if sys.platform == "darwin" else peak * 1024)
-
-
-def load_selection(path: Path) -> dict[str, Any]:
-    """Reads `selection.json`; raises UserError when it is none."""
-    selection = read_json(path, "selection")
-    if not isinstance(selection, dict) or "indices" not in selection:
-        raise UserError(f"'{path}' is no selection; make one with `viewbench select`")
-    return selection

@@ -8,18 +8,22 @@ A backend is one module (or folder) here. Its docstring's first line is its summ
     train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict, report: Report) -> Trained
     render(model: Path, cameras: Cameras) -> Iterator[np.ndarray]      (H, W, 3) float32 in [0, 1], one per camera
 
+and, where a study has to know more to run again what changed,
+
+    configuration() -> {"train": {...}, "render": {...}}     settings of the machine that models, and renders, depend on
+    RENDERERS: tuple[str, ...]                               modules beside its own that draw its models
+
 `train` fills the empty folder `out`, and nothing outside it; the caller moves `out` into place when it returns.
 Evaluation is shared (`_evaluate.py`): a backend never sees a test image and never scores itself.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from viewbench.scenes.types import Cameras, Points
+from ..scenes.types import Cameras, Points
 
 
 @dataclass(frozen=True)
@@ -37,16 +41,15 @@ class Capabilities:
 
 @dataclass(frozen=True)
 class TrainingSet:
-    """The chosen views and nothing else."""
+    """The chosen views, and beside them only what is the same for every choice."""
 
     scene: str
     names: tuple[str, ...]  # K frame names in the order chosen
     cameras: Cameras  # K cameras, scaled to the size of the images
     images: np.ndarray  # (K, H, W, 3) float32 in [0, 1]
-    points: Points | None  # seed points of the scene file; `seen_by` indexes the training split
+    points: Points | None  # of the scene file; `seen_by` indexes the training split
     chosen: np.ndarray  # (K,) int64 indices of the chosen views in the training split
-    paths: tuple[Path, ...] = ()  # K image files at full size
-    near: float = 0.0  # hint for a near plane in scene units; 0 leaves it to the backend
+    training: Cameras  # the poses of all N training views: what `_surroundings.py` goes by, whatever was chosen
 
 
 @dataclass(frozen=True)
@@ -81,4 +84,6 @@ class Trained:
     curve: list[dict[str, float | None]] = field(default_factory=list)  # step, seconds, loss, test_psnr_db
     device: str = "cpu"
     threads: int = 1
+    peak_rss_bytes: int | None = None  # of the programs that it ran, with this process; None where it ran none
+    peak_gpu_bytes: int | None = None  # None where no GPU took part, or nothing can be known
     notes: dict[str, Any] = field(default_factory=dict)

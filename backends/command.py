@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.backends import _process, _subset
-from viewbench.backends._ply_render import render_ply
-from viewbench.backends._seeding import SOURCES, seed_points
-from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
-from viewbench.common.errors import UserError, nearest
-from viewbench.common.files import read_json, write_json
-from viewbench.common.settings import Command, Settings
-from viewbench.scenes.types import Cameras
+from ..common.errors import UserError, nearest
+from ..common.files import read_json, write_json
+from ..common.settings import Command, Settings
+from ..scenes.types import Cameras
+from . import _process, _subset
+from ._ply_render import ply_renderer, render_ply  # no source: training does not draw
+from ._seeding import SOURCES, seed_points
+from ._types import Budget, Capabilities, Report, Trained, TrainingSet
 
 LOG = "command.log"
 SCENE = "scene"  # the subset, inside the model folder while the program trains
@@ -31,6 +31,8 @@ RECORD = "command.json"  # what rendering has to know of the training
 VERSION_SECONDS = 60.0
 POINTS_OFF = "none"
 RANDOM_POINTS = 100_000  # as the 3DGS authors draw where a scene has none
+
+PLY_RENDERERS = ("backends._ply_render", "backends.gsplat", "backends.splat")
 
 CAPABILITIES = Capabilities()  # of the family; an entry's own depend on its command line
 
@@ -78,6 +80,18 @@ class External:
             options={"points": "scene"},
         )
 
+    @property
+    def RENDERERS(self) -> tuple[str, ...]:  # noqa: N802 - the name that the protocol gives it
+        """Modules of viewbench that draw its models where it has no command that does."""
+        return () if self.entry.render else PLY_RENDERERS
+
+    def configuration(self) -> dict[str, dict[str, Any]]:
+        """What of its section a training depends on, and what a render does."""
+        entry = self.entry
+        train = {"train": entry.train, "format": entry.format}
+        render = {"render": entry.render, "format": entry.format, "output": entry.output}
+        return {"train": train, "render": render if entry.render else {"output": entry.output, "by": ply_renderer()}}
+
     def available(self) -> str | None:
         for part, command in (("train", self.entry.train), ("render", self.entry.render)):
             if command and shutil.which(command[0]) is None:
@@ -119,7 +133,8 @@ class External:
         _subset.write(out / SCENE, self.entry.format, data.cameras, data.images, points)
         began = time.perf_counter()
         report.progress(0, None, f"running {self.entry.train[0]}, which writes {LOG}")
-        _process.run(_filled(self.entry.train, values), out, out / LOG, self._what, self.entry.timeout or None)
+        command = _filled(self.entry.train, values)
+        usage = _process.run(command, out, out / LOG, self._what, self.entry.timeout or None)
         seconds = time.perf_counter() - began
         shutil.rmtree(out / SCENE)
         write_json(out / RECORD, {"seed": seed, "iterations": budget.iterations})
@@ -130,6 +145,8 @@ class External:
             seconds=seconds,
             seeding=seeding,
             device=self.entry.device,
+            peak_rss_bytes=usage.rss_bytes,
+            peak_gpu_bytes=usage.gpu_bytes,
             notes={"command": [str(part) for part in self.entry.train]},
         )
 

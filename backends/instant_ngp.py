@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.backends import _ngp_driver, _process, _subset
-from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json, sha256_file, write_json
-from viewbench.common.settings import Settings
-from viewbench.scenes.types import Cameras
+from ..common.errors import UserError
+from ..common.files import read_json, sha256_file, write_json
+from ..common.settings import Settings
+from ..scenes.types import Cameras
+from . import _ngp_driver, _process, _subset
+from ._memory import Usage
+from ._types import Budget, Capabilities, Report, Trained, TrainingSet
 
 SNAPSHOT = "model.ingp"
 RECORD = "model.json"
@@ -98,7 +99,7 @@ class InstantNgp:
             "seconds": budget.seconds or 0.0,
             "near": options["near_distance"],
         }
-        self._drive("train", arguments, out, out / LOG)
+        usage = self._drive("train", arguments, out, out / LOG)
         shutil.rmtree(scene)
         record = read_json(out / RECORD, "instant-ngp's record")
         write_json(out / RECORD, {**record, "samples": options["samples"], "near": options["near_distance"]})
@@ -108,6 +109,8 @@ class InstantNgp:
             seeding={"points": "none", "count": 0},
             curve=[{**point, "test_psnr_db": None} for point in record["curve"]],
             device="cuda",
+            peak_rss_bytes=usage.rss_bytes,
+            peak_gpu_bytes=usage.gpu_bytes,
         )
 
     def render(self, model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
@@ -130,13 +133,13 @@ class InstantNgp:
 
     def _drive(
         self, action: str, arguments: dict[str, Any], folder: Path, log: Path, timeout_s: float | None = None
-    ) -> None:
+    ) -> Usage:
         """Runs one action of _ngp_driver.py under the checkout's Python; paths are made absolute."""
         command = [self.python, str(Path(_ngp_driver.__file__).resolve()), action]
         command.append(str(Path(self.checkout).expanduser().resolve()))
         for name, value in arguments.items():
             command += [f"--{name}", str(value.resolve() if isinstance(value, Path) else value)]
-        _process.run(command, folder, log, f"instant-ngp ({action})", timeout_s)
+        return _process.run(command, folder, log, f"instant-ngp ({action})", timeout_s)
 
 
 def _check(data: TrainingSet, options: dict[str, Any]) -> None:

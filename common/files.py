@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from viewbench.common.errors import UserError
+from .errors import UserError
 
 
 @contextlib.contextmanager
@@ -97,6 +97,13 @@ def plain(value: Any) -> Any:
 def finite_or_none(value: float) -> float | None:
     """`value`, or None where it is NaN or infinite: JSON has neither."""
     return float(value) if math.isfinite(value) else None
+
+
+def sha256_folder(path: str | os.PathLike) -> dict[str, str]:
+    """Hex SHA-256 of every file below the folder, by its path from there, sorted."""
+    root = Path(path)
+    files = sorted(file for file in root.rglob("*") if file.is_file())
+    return {file.relative_to(root).as_posix(): sha256_file(file) for file in files}
 
 
 def sha256_file(path: str | os.PathLike) -> str:

@@ -12,7 +12,7 @@ import pkgutil
 from pathlib import Path
 from types import ModuleType
 
-from viewbench.common.errors import UserError, nearest
+from .errors import UserError, nearest
 
 
 def names(package: str) -> list[str]:
@@ -38,6 +38,11 @@ def load(package: str, name: str) -> ModuleType:
 def module_name(package: str, name: str) -> str:
     """The import name of a plug-in."""
     return f"viewbench.{package}.{name.replace('-', '_')}"
+
+
+def source_name(package: str, name: str) -> str:
+    """The plug-in's name as `sources` takes it: without the package's own."""
+    return module_name(package, name).removeprefix("viewbench.")
 
 
 def summary(package: str, name: str) -> str:

@@ -5,7 +5,7 @@ import os
 import platform
 import subprocess
 
-from viewbench.common.settings import PACKAGE
+from .settings import PACKAGE
 
 
 @functools.cache

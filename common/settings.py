@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from viewbench.common.errors import UserError, nearest
+from .errors import UserError, nearest
 
 PACKAGE = Path(__file__).resolve().parent.parent
 FILE = "environment.toml"

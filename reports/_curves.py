@@ -6,9 +6,9 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
-from viewbench.reports._statistics import Summary, summary
-from viewbench.reports._study import FULL, Cell, in_order, percent
-from viewbench.reports._style import Style
+from ._statistics import Summary, summary
+from ._study import FULL, Cell, in_order, percent
+from ._style import Style
 
 SIDESTEP = 0.36  # selectors stand side by side at a ratio: the width they take of the gap to the next ratio
 

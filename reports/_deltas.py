@@ -7,11 +7,11 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
-from viewbench.reports import _figures, _published
-from viewbench.reports._published import DATASETS, MODELS, Score
-from viewbench.reports._statistics import Summary, signed, summary
-from viewbench.reports._study import Study, in_order, percent
-from viewbench.reports._style import Style, styles
+from . import _figures, _published
+from ._published import DATASETS, MODELS, Score
+from ._statistics import Summary, signed, summary
+from ._study import Study, in_order, percent
+from ._style import Style, styles
 
 BASELINE = "uniform"
 PAPER_RATIO = 0.05  # a study is shown at its ratio nearest to this

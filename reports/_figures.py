@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from viewbench.common.files import whole
-from viewbench.reports._study import FULL
-from viewbench.reports._style import Style
-from viewbench.reports._tables import write_csv
+from ..common.files import whole
+from ._study import FULL
+from ._style import Style
+from ._tables import write_csv
 
 LOOK: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same glyphs everywhere

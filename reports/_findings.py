@@ -1,7 +1,7 @@
 """What the numbers say, in sentences: is the paper's selector better than plain choice, and by more than chance?"""
 
-from viewbench.reports._statistics import Difference, difference, number, over_ratios, signed, summary
-from viewbench.reports._study import Study, and_list, percent
+from ._statistics import Difference, difference, number, over_ratios, signed, summary
+from ._study import FULL, Study, and_list, percent
 
 BASELINES = ("uniform", "random")
 SUBJECT = "maxmin"  # the paper's own selector; a study without it is told about its best one
@@ -64,11 +64,11 @@ def against(
     baseline: str,
     ratios: tuple[float, ...] | None = None,
 ) -> Difference | None:
-    """Difference of PSNR in dB, averaged over `ratios` (all of the study's when left out).
+    """Difference of PSNR in dB, averaged over `ratios` (all that the backend runs when left out).
 
     None where the two are the same or a side has no seed with a score at every ratio.
     """
-    ratios = ratios or study.ratios
+    ratios = ratios or study.ratios_of(backend)
     ours = over_ratios(study.find(backend, scene, selector), ratios)
     theirs = over_ratios(study.find(backend, scene, baseline), ratios)
     return difference(ours, theirs) if ours and theirs and selector != baseline else None
@@ -76,23 +76,35 @@ def against(
 
 def _scene(study: Study, backend: str, scene: str, subject: str) -> str:
     label = study.label(backend, scene)
-    samples = {name: over_ratios(study.find(backend, scene, name), study.ratios) for name in study.selectors}
+    ratios = study.ratios_of(backend)
+    samples = {name: over_ratios(study.find(backend, scene, name), ratios) for name in study.selectors}
     means = {name: summary(values).mean for name, values in samples.items() if values}
     if subject not in means:
         return f"{label}: {subject} lacks a score at some ratio, so nothing is concluded."
-    averaged = f"on average over the ratios {and_list(map(percent, study.ratios))}"
-    over = averaged if len(study.ratios) > 1 else f"at a ratio of {percent(study.ratios[0])}"
+    averaged = f"on average over the ratios {and_list(map(percent, ratios))}"
+    over = averaged if len(ratios) > 1 else f"at a ratio of {percent(ratios[0])}"
     sentences = [f"{label}: {subject} scores {number(means[subject], 2)} dB {over}."]
     for baseline in BASELINES:
         found = against(study, backend, scene, subject, baseline)
         if found is not None:
             sentences.append(f"Against {baseline}: {_with_interval(found)}, {WORDS[found.verdict]}.")
+            sentences += _at_single_ratios(study, backend, scene, subject, baseline)
     ranked = sorted(means, key=lambda name: -means[name])
     if ranked[0] != subject:
         sentences.append(f"The highest mean is that of {ranked[0]}, {number(means[ranked[0]], 2)} dB.")
     elif len(ranked) > 1:
         sentences.append(f"Its mean is the highest; {ranked[1]} comes next with {number(means[ranked[1]], 2)} dB.")
     return " ".join(sentences + _against_full(study, backend, scene, subject))
+
+
+def _at_single_ratios(study: Study, backend: str, scene: str, subject: str, baseline: str) -> list[str]:
+    """Zero or one sentence: the differences at each ratio, where there are several."""
+    ratios = study.ratios_of(backend)
+    if len(ratios) < 2:
+        return []
+    found = [(ratio, against(study, backend, scene, subject, baseline, (ratio,))) for ratio in ratios]
+    parts = [f"{_with_interval(item)} at {percent(ratio)}" for ratio, item in found if item is not None]
+    return [f"Ratio by ratio: {'; '.join(parts)}."] if parts else []
 
 
 def _with_interval(found: Difference) -> str:
@@ -102,15 +114,18 @@ def _with_interval(found: Difference) -> str:
 
 
 def _against_full(study: Study, backend: str, scene: str, subject: str) -> list[str]:
-    """Zero or one sentence: the subject's largest ratio beside the model trained on all views."""
-    full, ratio = study.full(backend, scene), study.ratios[-1]
+    """Zero or one sentence: the subject's largest ratio beside the models trained on all views."""
+    ratio = study.ratios_of(backend)[-1]
+    reference = study.find(backend, scene, FULL)
+    full = [cell.psnr_db for cell in reference if cell.psnr_db is not None]
     scores = [cell.psnr_db for cell in study.find(backend, scene, subject, ratio) if cell.psnr_db is not None]
-    if full is None or full.psnr_db is None or not scores:
+    if not full or not scores:
         return []
-    gap = summary(scores).mean - full.psnr_db
+    gap = difference(scores, full)
+    models = "one model" if len(full) == 1 else f"{len(full)} models"
     return [
-        f"At {percent(ratio)} it is {number(abs(gap), 2)} dB {'above' if gap >= 0 else 'below'} one model trained on "
-        f"all {full.count} views ({number(full.psnr_db, 2)} dB)."
+        f"At {percent(ratio)} its difference to {models} trained on all {reference[0].count} views "
+        f"({number(summary(full).mean, 2)} dB) is {_with_interval(gap)}."
     ]
 
 

@@ -4,9 +4,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json, write_json
-from viewbench.reports._tables import Entry, Table
+from ..common.errors import UserError
+from ..common.files import read_json, write_json
+from ._tables import Entry, Table
 
 
 @dataclass(frozen=True)

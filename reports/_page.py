@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from viewbench import __version__
-from viewbench.common import plugins
-from viewbench.common.errors import UserError
-from viewbench.common.files import write_text
-from viewbench.common.provenance import machine
-from viewbench.reports import _findings, _items, _study
-from viewbench.reports._items import Item
-from viewbench.reports._study import OK, Study, and_list, in_order, percent
+from .. import __version__
+from ..common import plugins
+from ..common.errors import UserError
+from ..common.files import write_text
+from ..common.provenance import machine
+from . import _findings, _items, _study
+from ._items import Item
+from ._study import OK, Study, and_list, in_order, percent, selector_words
 
 TEMPLATES = Path(__file__).parent / "templates"
 HEAVY_BYTES = 300_000  # a larger PNG goes into the page as WebP; the PNG itself stays beside the page
@@ -109,11 +109,16 @@ def _facts(study: Study) -> list[tuple[str, str]]:
     )
     facts = [
         ("Scenes", and_list(_scene_words(study, scene) for scene in study.scenes)),
-        ("Selectors", and_list(study.selectors)),
+        ("Selectors", and_list(map(selector_words, study.record["selectors"]))),
         ("Ratios", and_list(map(percent, study.ratios))),
         ("Seeds", and_list(map(str, study.seeds))),
         ("Backends", "; ".join(_backend_words(study, entry, trains) for entry in study.record["backends"])),
-        ("Reference", "one model on all views of each scene, same budget" if study.record.get("reference") else "none"),
+        (
+            "Reference",
+            "a model on all views of each scene for every seed, same budget"
+            if study.record.get("reference")
+            else "none",
+        ),
         ("Image encoder", study.record.get("encoder", "")),
         (
             "Cells",
@@ -158,8 +163,10 @@ def _backend_words(study: Study, entry: dict[str, Any], trains: list[dict[str, A
     if entry.get("seconds"):
         limits.append(f"{entry['seconds']:g} s")
     width = f" at width {entry['width']}" if entry.get("width") else " at full width"
+    options = "".join(f", {key}={value}" for key, value in (entry.get("options") or {}).items())
+    part = ", a part of the grid" if entry.get("grid") else ""
     called = name if entry["backend"] == name else f"{name} ({entry['backend']})"
-    return f"{called} {version}".strip() + f": {', '.join(limits)}{width}"
+    return f"{called} {version}".strip() + f": {', '.join(limits)}{width}{options}{part}"
 
 
 def _tied(text: str) -> str:

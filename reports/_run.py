@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from viewbench.common import plugins
-from viewbench.reports import _items, _page, _study
+from ..common import plugins
+from . import _items, _page, _study
 
 
 def run(study_dir: Path, name: str) -> None:

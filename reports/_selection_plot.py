@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError, nearest
-from viewbench.common.files import whole
+from ..common.errors import UserError, nearest
+from ..common.files import whole
 
 KINDS = (".png", ".pdf", ".svg", ".html")
 GREY, CHOSEN = "#9a9a9a", "#D55E00"
@@ -36,8 +36,8 @@ def _arrow(positions: np.ndarray) -> float:
 
 
 def _from_above(path: Path, title: str, positions: np.ndarray, forward: np.ndarray, chosen: np.ndarray) -> None:
-    from viewbench.reports._figures import grid, look
-    from viewbench.reports._topview import pieces, plane
+    from ._figures import grid, look
+    from ._topview import pieces, plane
 
     axes_2d = plane(positions, forward)
     flat, looks = positions @ axes_2d.T, forward @ axes_2d.T
@@ -76,7 +76,7 @@ def _interactive(path: Path, title: str, positions: np.ndarray, forward: np.ndar
         import plotly.graph_objects as go
     except ImportError:
         raise UserError("an interactive picture needs plotly: pip install 'viewbench[plot]'") from None
-    from viewbench.reports._topview import plane
+    from ._topview import plane
 
     tips = positions[chosen] + _arrow(positions) * forward[chosen]
     rays = np.stack([positions[chosen], tips, np.full_like(tips, np.nan)], axis=1).reshape(-1, 3)

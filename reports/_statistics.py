@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from viewbench.reports._study import Cell
+from ._study import Cell
 
 LEVEL = 0.95  # of the intervals
 

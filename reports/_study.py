@@ -8,8 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json
+from ..common.errors import UserError
+from ..common.files import read_json
 
 FULL = "full"  # the selector name of the full-data reference
 OK = "ok"
@@ -89,10 +89,10 @@ class Study:
         """The cells that have none."""
         return tuple(cell for cell in self.cells if not cell.ok)
 
-    @property
-    def middle_ratio(self) -> float:
-        """The ratio that figures of a single ratio show."""
-        return self.ratios[(len(self.ratios) - 1) // 2]
+    def middle_ratio(self, backend: str | None = None) -> float:
+        """The ratio that figures of a single ratio show: the middle one of those of the backend, or of the study."""
+        ratios = self.ratios if backend is None else self.ratios_of(backend)
+        return ratios[(len(ratios) - 1) // 2]
 
     @property
     def first_seed(self) -> int:
@@ -122,8 +122,15 @@ class Study:
         return [cell for cell in self.done if all(getattr(cell, key) == value for key, value in wanted.items())]
 
     def full(self, backend: str, scene: str) -> Cell | None:
-        """The full-data reference, where it was run."""
+        """The full-data reference of the first seed that has one."""
         return next(iter(self.find(backend, scene, FULL)), None)
+
+    def ratios_of(self, backend: str) -> tuple[float, ...]:
+        """The ratios that a backend runs, all of the study's unless the study says otherwise; ascending."""
+        for entry in self.record["backends"]:
+            if entry["name"] == backend and (entry.get("grid") or {}).get("ratios"):
+                return tuple(sorted(entry["grid"]["ratios"]))
+        return self.ratios
 
     def scene(self, name: str) -> SceneInfo:
         """Cameras of a scene; raises UserError when its description is missing or lacks a part."""
@@ -204,6 +211,14 @@ def and_list(words: Iterable[str]) -> str:
     """ "a", "a and b", "a, b and c"."""
     items = list(words)
     return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)
+
+
+def selector_words(entry: dict[str, Any]) -> str:
+    """A selector of study.json for people: "maxmin", "logdet-sample (logdet, sample=True)"."""
+    parts = [] if entry["selector"] == entry["name"] else [entry["selector"]]
+    for key, value in (entry.get("parameters") or {}).items():
+        parts.append(f"{key}={'+'.join(map(str, value)) if isinstance(value, list) else value}")
+    return f"{entry['name']} ({', '.join(parts)})" if parts else entry["name"]
 
 
 def failures_note(study: Study) -> str:

@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from viewbench.reports._study import FULL
+from ._study import FULL
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ FIXED = {
     "uniform": Style("#0072B2", "s"),
     "coverage": Style("#009E73", "^", (0, (4, 1))),
     "logdet": Style("#CC79A7", "D", (0, (3, 1, 1, 1))),
+    "logdet-sample": Style("#661100", "H", (0, (1, 2))),
     "maxmin": Style("#D55E00", "v"),
     FULL: Style("#000000", "*", (0, (6, 3))),
 }

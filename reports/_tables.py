@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewbench.common.files import whole, write_text
+from ..common.files import whole, write_text
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json
-from viewbench.common.settings import Tracking
+from ..common.errors import UserError
+from ..common.files import read_json
+from ..common.settings import Tracking
 
 CELL, FINGERPRINT = "viewbench.cell", "viewbench.fingerprint"
 KEY = ("backend", "scene", "selector", "ratio", "seed")

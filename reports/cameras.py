@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from viewbench.common.errors import UserError
-from viewbench.reports import _figures, _topview
-from viewbench.reports._items import Item
-from viewbench.reports._study import Cell, SceneInfo, Study, percent
-from viewbench.reports._style import Style, styles
+from ..common.errors import UserError
+from . import _figures, _topview
+from ._items import Item
+from ._study import Cell, SceneInfo, Study, percent
+from ._style import Style, styles
 
 ORDER = 30
 NEAR = 0.3  # scene points this far from the cameras are still shown, as a part of the cameras' extent
@@ -22,7 +22,7 @@ def build(study: Study, out: Path) -> list[Item]:
     items = []
     for scene in study.scenes:
         # Every backend trains on the same choice: any one of them shows it.
-        found = study.find(scene=scene, ratio=study.middle_ratio, seed=study.first_seed)
+        found = study.find(scene=scene, ratio=study.middle_ratio(), seed=study.first_seed)
         chosen = {cell.selector: cell for cell in reversed(found)}
         cells = [chosen[name] for name in study.selectors if name in chosen]
         if cells:
@@ -56,7 +56,7 @@ def _figure(study: Study, scene: SceneInfo, cells: list[Cell], out: Path) -> Ite
         figure.legend(handles=_handles(len(points) > 0), loc="outside lower center", ncols=4)
         files = _figures.save(figure, out, f"cameras_{scene.name}", records)
     caption = (
-        f"{scene.name} from above at {percent(study.middle_ratio)}, seed {study.first_seed}. Coloured: the chosen "
+        f"{scene.name} from above at {percent(study.middle_ratio())}, seed {study.first_seed}. Coloured: the chosen "
         "cameras, each with an arrow along its viewing direction (short where it looks up or down); grey line: the "
         f"path of all {scene.n_train} training views; crosses: the {scene.n_test} test cameras. Crowded arrows are "
         "views that repeat each other; bare stretches of the path are what the choice leaves out. Up is estimated "

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from viewbench.reports import _curves, _figures
-from viewbench.reports._items import Item
-from viewbench.reports._study import FULL, Study, failures_note
-from viewbench.reports._style import styles
+from . import _curves, _figures
+from ._items import Item
+from ._study import FULL, Study, failures_note
+from ._style import styles
 
 ORDER = 10
 NAME = "psnr_over_ratio"

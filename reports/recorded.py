@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json
-from viewbench.reports import _curves, _figures, _tables
-from viewbench.reports._items import Item
-from viewbench.reports._statistics import usual_n, with_spread
-from viewbench.reports._study import FULL, Cell, Study, and_list, in_order, percent, read_cells
-from viewbench.reports._style import styles
-from viewbench.reports._tables import Entry, Table
+from ..common.errors import UserError
+from ..common.files import read_json
+from . import _curves, _figures, _tables
+from ._items import Item
+from ._statistics import usual_n, with_spread
+from ._study import FULL, Cell, Study, and_list, in_order, percent, read_cells
+from ._style import styles
+from ._tables import Entry, Table
 
 ORDER = 60
 FOLDER = Path(__file__).parent / "recorded"

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from viewbench.reports import _figures
-from viewbench.reports._items import Item
-from viewbench.reports._statistics import number
-from viewbench.reports._study import FULL, Cell, Study, percent
+from . import _figures
+from ._items import Item
+from ._statistics import number
+from ._study import FULL, Cell, Study, percent
 
 ORDER = 40
 VIEWS = 3  # test views shown per scene
@@ -22,7 +22,7 @@ def build(study: Study, out: Path) -> list[Item]:
 
 
 def _strip(study: Study, backend: str, scene: str, out: Path) -> Item | None:
-    found = study.find(backend, scene, ratio=study.middle_ratio, seed=study.first_seed)
+    found = study.find(backend, scene, ratio=study.middle_ratio(backend), seed=study.first_seed)
     by_selector = {cell.selector: cell for cell in found if cell.selector != FULL}
     cells = [by_selector[name] for name in study.selectors if name in by_selector]
     full = study.full(backend, scene)
@@ -55,10 +55,11 @@ def _strip(study: Study, backend: str, scene: str, out: Path) -> Item | None:
         figure.set_layout_engine("constrained", w_pad=0.02, h_pad=0.02, wspace=0, hspace=0)
         suffix = f"_{backend}" if len(study.backends) > 1 else ""
         files = _figures.save(figure, out, f"renders_{scene}{suffix}", records)
+    share = percent(study.middle_ratio(backend))
     caption = (
-        f"{study.label(backend, scene)} at {percent(study.middle_ratio)} of the views, seed {study.first_seed}: "
-        f"{len(chosen)} test views, evenly spaced in the test split and not chosen by score, with the PSNR of each "
-        "picture. One seed each: a single picture says little about a selector."
+        f"{study.label(backend, scene)} at {share} of the views, seed {study.first_seed}: {len(chosen)} test views, "
+        "evenly spaced in the test split and not chosen by score, with the PSNR of each picture. One seed each: a "
+        "single picture says little about a selector."
     )
     return Item(f"Test views of {study.label(backend, scene)}", "figure", caption, files)
 

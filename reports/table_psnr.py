@@ -4,19 +4,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewbench.reports import _findings, _tables
-from viewbench.reports._items import Item
-from viewbench.reports._statistics import (
+from . import _findings, _tables
+from ._items import Item
+from ._statistics import (
     Difference,
     Summary,
     interval,
-    signed,
     summary,
     usual_n,
     with_spread,
 )
-from viewbench.reports._study import FULL, Cell, Study, failures_note, percent
-from viewbench.reports._tables import Entry, Table
+from ._study import FULL, Cell, Study, failures_note, percent
+from ._tables import Entry, Table
 
 ORDER = 20
 
@@ -54,7 +53,7 @@ def _scores(study: Study, metric: Metric, out: Path) -> Item:
     rows, records = [], []
     for backend, scene in study.panels():
         full = _summary(metric, study.find(backend, scene, FULL))
-        for ratio in study.ratios:
+        for ratio in study.ratios_of(backend):
             here = {name: _summary(metric, study.find(backend, scene, name, ratio)) for name in study.selectors}
             found = {name: item for name, item in here.items() if item is not None}
             if not found:
@@ -70,7 +69,11 @@ def _scores(study: Study, metric: Metric, out: Path) -> Item:
             row += [Entry(scene), Entry(percent(ratio), ratio), Entry(str(count or ""), count)]
             for name in selectors:
                 item = shown[name]
-                text = "" if item is None else with_spread(item, metric.digits, expected if name != FULL else 1)
+                text = (
+                    ""
+                    if item is None
+                    else with_spread(item, metric.digits, expected if name != FULL else (item.n if item else 1))
+                )
                 row.append(Entry(text, None if item is None else item.mean, best.get(name, False)))
                 if item is not None:
                     records.append(_record(metric, backend, scene, name, 1.0 if name == FULL else ratio, item))
@@ -104,7 +107,7 @@ def _differences(study: Study, out: Path) -> Item | None:
                 row += [Entry(scene), Entry(selector), Entry(baseline)]
                 for ratio in study.ratios if len(study.ratios) > 1 else ():
                     part = _findings.against(study, backend, scene, selector, baseline, (ratio,))
-                    row.append(Entry("" if part is None else signed(part.mean), None if part is None else part.mean))
+                    row.append(Entry("" if part is None else interval(part), None if part is None else part.mean))
                     if part is not None:
                         records.append(_difference_record(backend, scene, selector, baseline, percent(ratio), part))
                 row += [Entry(interval(total), total.mean), Entry(total.verdict, total.mean)]
@@ -114,15 +117,15 @@ def _differences(study: Study, out: Path) -> Item | None:
         return None
     head = ["backend"] if len(study.backends) > 1 else []
     labels = [*head, "scene", "selector", "against"]
-    parts = [f"Δ at {percent(ratio)}" for ratio in study.ratios] if len(study.ratios) > 1 else []
-    table = Table((*labels, *parts, "Δ over all (95 % interval)", "in words"), tuple(rows), len(labels))
+    parts = [f"Δ at {percent(ratio)} (95 % interval)" for ratio in study.ratios] if len(study.ratios) > 1 else []
+    table = Table((*labels, *parts, "Δ over all (95 % interval)", "in words, over all"), tuple(rows), len(labels))
     files = _tables.save(table, out, "table_differences", records)
     caption = (
-        "Difference of mean PSNR in dB; positive means that the selector is better. For the interval each seed's PSNR "
-        "is averaged over the ratios, and the seeds of the two selectors are compared by Welch's t interval, not in "
-        "pairs: equal seed numbers share no randomness. “Not told apart” means that the interval holds zero: the "
-        "seeds differ among themselves by as much. By chance alone one interval in twenty leaves it out. Nothing here "
-        "says how it is on other scenes."
+        "Difference of mean PSNR in dB; positive means that the selector is better. In brackets: its 95 % interval. "
+        "Over all ratios, each seed's PSNR is averaged over them. The seeds of the two selectors are compared by "
+        "Welch's t interval, not in pairs: choices with equal seed numbers share no randomness. “Not told apart” means "
+        "that the interval holds zero: the seeds differ among themselves by as much. By chance alone one interval in "
+        "twenty leaves it out. Nothing here says how it is on other scenes."
     )
     return Item("Differences to uniform and random choice", "table", caption, files, table)
 

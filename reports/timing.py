@@ -7,12 +7,12 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from viewbench.reports import _figures, _tables
-from viewbench.reports._items import Item
-from viewbench.reports._statistics import summary
-from viewbench.reports._study import FULL, Cell, Study, failures_note, percent
-from viewbench.reports._style import Style, styles
-from viewbench.reports._tables import Entry, Table
+from . import _figures, _tables
+from ._items import Item
+from ._statistics import summary
+from ._study import FULL, Cell, Study, and_list, failures_note, in_order, percent
+from ._style import Style, styles
+from ._tables import Entry, Table
 
 ORDER = 50
 STAGES = ("select", "train", "evaluate")
@@ -47,8 +47,9 @@ def _stages(study: Study, drawn: dict[str, Style], out: Path) -> Item:
     caption = (
         "Wall time in seconds; one dot per cell over all scenes, ratios and seeds, the bar is the mean. Select counts "
         "the similarity and the choice but not the image features, which a scene needs once; it has a logarithmic "
-        "axis, the others start at zero. Train leaves out set-up and the probes behind the curves. Cells that ran at "
-        f"the same time shared the machine.{failures_note(study)}"
+        "axis, the others start at zero. A greedy order is made once for all ratios, and each has its time. Train "
+        "leaves out set-up and the probes behind the curves. Cells that ran at the same time shared the machine."
+        f"{failures_note(study)}"
     )
     return Item("Time per stage", "figure", caption, files)
 
@@ -110,7 +111,11 @@ def _table(study: Study, selectors: list[str], out: Path) -> Item:
 def _training(study: Study, drawn: dict[str, Style], out: Path) -> Item | None:
     """PSNR over training seconds at the middle ratio, one line per run; all ratios are in the CSV."""
     curves = [(cell, curve) for cell in study.done if (curve := _curve(cell))]
-    shown = [(cell, curve) for cell, curve in curves if cell.ratio == study.middle_ratio or cell.selector == FULL]
+    shown = [
+        (cell, curve)
+        for cell, curve in curves
+        if cell.ratio == study.middle_ratio(cell.backend) or cell.selector == FULL
+    ]
     panels = [panel for panel in study.panels() if any((c.backend, c.scene) == panel for c, _ in shown)]
     if not panels:
         return None
@@ -134,8 +139,9 @@ def _training(study: Study, drawn: dict[str, Style], out: Path) -> Item | None:
         handles = [Line2D([], [], color=drawn[n].colour, linestyle=drawn[n].dash, label=n) for n in present]
         figure.legend(handles=handles, loc="outside lower center", ncols=6, handlelength=2.6)
         files = _figures.save(figure, out, "training_curves", records)
+    ratios = and_list(percent(ratio) for ratio in in_order(study.middle_ratio(backend) for backend, _ in panels))
     caption = (
-        f"PSNR of a few test views during training at {percent(study.middle_ratio)} of the views; one line per seed. "
+        f"PSNR of a few test views during training at {ratios} of the views; one line per seed. "
         "It is a probe of at most eight views, so its end differs from the score over all test views. A line that "
         "still climbs at its end means that the budget, not the choice of views, sets the score."
     )

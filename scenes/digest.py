@@ -1,27 +1,77 @@
-"""One hash of everything that a scene was read from."""
+"""One hash of everything that a scene was read from, whichever folder it lies in."""
 
+import contextlib
 import hashlib
+import json
+import os
+import time
 from pathlib import Path
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import sha256_file
-from viewbench.scenes.types import Scene
+from ..common.errors import UserError
+from ..common.files import sha256_file, write_json
+from .types import Scene
+
+REMEMBERED_BYTES = 1 << 26  # the hashes of larger scenes are kept: reading gigabytes again for every step takes hours
+SETTLED_S = 2.0  # a file changed less than that ago may change again without a new time
 
 
 def scene_sha256(scene: Scene) -> str:
-    """Hex SHA-256 over the metadata files, the images of both splits and the rule of the test split."""
-    digest = hashlib.sha256(scene.holdout.encode())
+    """Hex SHA-256 over format, rule of the test split, metadata files and the images of both splits, with their names.
+
+    The hashes of a large scene's files are kept in the user's cache and used again for a file of the same size, times
+    and inode. Raises UserError for a file that cannot be read.
+    """
+    digest = hashlib.sha256(f"{scene.format}\0{scene.holdout}\0".encode())
+    named = [(path.name, path) for path in scene.files]
+    for split in (scene.train, scene.test):
+        digest.update(f"{len(split)}\0".encode())
+        if not scene.details.get("extracted"):  # pictures that a reader made itself of its files say nothing new
+            named += zip(split.names, split.paths, strict=True)
     try:
-        for path in scene.files:
-            digest.update(_entry(path.name, path))
-        for split in (scene.train, scene.test):
-            for name, path in zip(split.names, split.paths, strict=True):
-                digest.update(_entry(name, path))
+        hashes = _hashes([path for _, path in named])
     except OSError as error:
         raise UserError(f"scene '{scene.name}': '{error.filename}' cannot be read: {error.strerror}") from None
+    for (name, _), sha256 in zip(named, hashes, strict=True):
+        digest.update(f"{name}\0{sha256}\0".encode(errors="surrogatepass"))  # surrogates: names that are not UTF-8
     return digest.hexdigest()
 
 
-def _entry(name: str, path: Path) -> bytes:
-    """Surrogates stand in names that are not UTF-8 on disk."""
-    return f"{name}\0{sha256_file(path)}\0".encode(errors="surrogatepass")
+def _hashes(paths: list[Path]) -> list[str]:
+    """SHA-256 of each file."""
+    states = [_state(path) for path in paths]
+    if sum(state[0] for state in states) < REMEMBERED_BYTES:
+        return [sha256_file(path) for path in paths]
+    # Absolute and not resolved: two links to one file are two entries, and nothing has to be looked up for them.
+    names = [os.fsencode(path.absolute()).hex() for path in paths]
+    file = _cache() / f"{hashlib.sha256(chr(10).join(sorted(names)).encode()).hexdigest()[:32]}.json"
+    known = _remembered(file)
+    settled = time.time_ns() - SETTLED_S * 1e9
+    result, fresh = [], {}
+    for name, path, state in zip(names, paths, states, strict=True):
+        entry = known.get(name)
+        sha256 = entry[-1] if entry is not None and entry[:-1] == state else sha256_file(path)
+        result.append(sha256)
+        if max(state[1:3]) < settled:
+            fresh[name] = [*state, sha256]
+    if fresh != known:
+        with contextlib.suppress(OSError):  # a full disk or a home that cannot be written to costs time, no more
+            write_json(file, fresh)
+    return result
+
+
+def _state(path: Path) -> list[int]:
+    """Size, times of change in nanoseconds, and inode: what differs whenever the content was written anew."""
+    found = path.stat()
+    return [found.st_size, found.st_mtime_ns, found.st_ctime_ns, found.st_ino]
+
+
+def _remembered(file: Path) -> dict[str, list]:
+    try:
+        known = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return known if isinstance(known, dict) else {}
+
+
+def _cache() -> Path:
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "viewbench" / "digests"

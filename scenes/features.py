@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.common import plugins
-from viewbench.common.errors import UserError
-from viewbench.common.files import sha256_file, whole
-from viewbench.scenes.types import Split
+from ..common import plugins
+from ..common.errors import UserError
+from ..common.files import sha256_file, whole
+from .types import Split
 
 ENCODERS = "scenes.encoders"
 DECODING = "squeezed to a square, bicubic"  # part of what the cache is named by

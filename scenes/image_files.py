@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from viewbench.common.errors import UserError
+from ..common.errors import UserError
 
 
 def is_file(path: Path) -> bool:

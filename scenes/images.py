@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.scenes.image_files import open_image
-from viewbench.scenes.types import Cameras, Split
+from ..common.errors import UserError
+from .image_files import open_image
+from .types import Cameras, Split
 
 
 def load_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[np.ndarray, Cameras]:

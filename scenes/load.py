@@ -4,12 +4,12 @@ import dataclasses
 import os
 from pathlib import Path
 
-from viewbench.common import plugins
-from viewbench.common.errors import UserError, nearest
-from viewbench.common.settings import PACKAGE, SceneEntry, Settings
-from viewbench.scenes.splits import hold_out
-from viewbench.scenes.types import Scene
-from viewbench.scenes.validate import check_scene
+from ..common import plugins
+from ..common.errors import UserError, nearest
+from ..common.settings import PACKAGE, SceneEntry, Settings
+from .splits import hold_out
+from .types import Scene
+from .validate import check_scene
 
 FORMATS = "scenes.formats"
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import whole
+from ..common.errors import UserError
+from ..common.files import whole
 
 
 def to_uint8(image: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import whole
-from viewbench.scenes.types import Points
+from ..common.errors import UserError
+from ..common.files import whole
+from .types import Points
 
 
 def read_points(path: Path) -> Points:

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.scenes.features import Progress, cached, content_hash, save, silent
-from viewbench.scenes.types import Split
+from ..common.errors import UserError
+from .features import Progress, cached, content_hash, save, silent
+from .types import Split
 
 SIZE = 512  # pixels of the longer side: blur is judged as a share of the picture, whatever its resolution
 

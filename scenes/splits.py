@@ -5,9 +5,10 @@ import re
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.scenes.types import Scene
+from ..common.errors import UserError
+from .types import Points, Scene
 
+LEAST_TRACK = 2  # training views that see a point: fewer cannot have triangulated it
 BLOCKS = 6  # held-out blocks of `blocks:8` in a capture that is long enough
 
 
@@ -47,12 +48,37 @@ def hold_out(scene: Scene, rule: str) -> Scene:
         raise UserError(f"scene '{scene.name}' has {len(scene.test)} test views of its own; leave --holdout out")
     held = held_out(rule, len(scene.train))
     kept = np.setdiff1d(np.arange(len(scene.train)), held)
-    points = scene.points
-    if points is not None and points.seen_by is not None:
-        place = np.full(len(scene.train), -1)
-        place[kept] = np.arange(len(kept))
-        seen = tuple(place[views][place[views] >= 0] for views in points.seen_by)
-        points = dataclasses.replace(points, seen_by=seen)
+    points, notes = training_points(scene.points, kept, len(scene.train))
     return dataclasses.replace(
-        scene, train=scene.train.subset(kept), test=scene.train.subset(held), points=points, holdout=rule
+        scene,
+        train=scene.train.subset(kept),
+        test=scene.train.subset(held),
+        points=points,
+        holdout=rule,
+        notes=(*scene.notes, *notes),
     )
+
+
+def training_points(points: Points | None, kept: np.ndarray, n: int) -> tuple[Points | None, tuple[str, ...]]:
+    """The points that training may know of when the views `kept` of `n` are its own, and a note if some are left out.
+
+    Those that a held-out view sees and fewer than two training views do go: they are known from the test. Tracks become
+    those of the training views. Where a format has no tracks all points stay, as do those that nobody is said to see.
+    What stays keeps its place, to which held-out views may have contributed.
+    """
+    if points is None or points.seen_by is None:
+        return points, ()
+    place = np.full(n, -1)
+    place[kept] = np.arange(len(kept))
+    tracks = [place[views][place[views] >= 0] for views in points.seen_by]
+    stays = [
+        len(left) >= LEAST_TRACK or len(left) == len(views) for left, views in zip(tracks, points.seen_by, strict=True)
+    ]
+    use = np.flatnonzero(stays)
+    left = Points(points.xyz[use], points.rgb[use], tuple(tracks[i] for i in use))
+    if len(use) == len(points):
+        return left, ()
+    note = (
+        f"{len(points) - len(use)} of {len(points)} points left out: fewer than {LEAST_TRACK} training views see them"
+    )
+    return left if len(use) else None, (note,)

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.common import plugins
-from viewbench.common.errors import UserError
-from viewbench.common.files import whole_folder, write_json
-from viewbench.scenes.image_files import check_whole, is_file
-from viewbench.scenes.types import Scene
+from ..common import plugins
+from ..common.errors import UserError
+from ..common.files import whole_folder, write_json
+from .image_files import check_whole, is_file
+from .types import Scene
 
 
 def write_subset(scene: Scene, selection: dict[str, Any], out: Path, copy: bool = False, force: bool = False) -> str:

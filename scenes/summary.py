@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.scenes.types import Scene
+from .types import Scene
 
 
 def summary(scene: Scene) -> dict[str, Any]:

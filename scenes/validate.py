@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.scenes.image_files import image_size, is_file
-from viewbench.scenes.types import Scene, Split
+from ..common.errors import UserError
+from .image_files import image_size, is_file
+from .types import Scene, Split
 
 RIGID = 1e-3  # largest deviation of RᵀR from the identity; poses are often written with a few digits
 

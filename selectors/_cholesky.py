@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from viewbench.selectors._columns import BLOCK, Columns
+from ._columns import BLOCK, Columns
 
 
 class Residuals:

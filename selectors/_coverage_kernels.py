@@ -76,7 +76,7 @@ def observers(nodes, positions, rotations, cameras):
 
 @numba.njit("float64(float64[::1], float64)", cache=True)
 def distance_to_uniform(mass, total):
-    """Σ_y |p(y) − u| of Eq. 7, twice TV, for bin masses (BINS,): p = mass / total, u = 1 / BINS."""
+    """Σ_y |p(y) − u|, twice the paper's total variation, for bin masses (BINS,): p = mass / total, u = 1 / BINS."""
     distance = 0.0
     for y in range(BINS):
         distance += abs(mass[y] / total - 1 / BINS)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from viewbench.selectors._cholesky import Residuals
+from ._cholesky import Residuals
 
 
 def sample(rows: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:

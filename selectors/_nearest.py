@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from viewbench.selectors._similarity import Similarity
+from ._similarity import Similarity
 
 MARGIN = 1e-9  # of the bounds below, far above the rounding of what they bound
 

@@ -1,5 +1,6 @@
 """Runs one selector on a scene: checks what was asked, prepares the views, times the choice, makes `selection.json`."""
 
+import hashlib
 import math
 import time
 from collections.abc import Sequence
@@ -7,25 +8,27 @@ from typing import Any
 
 import numpy as np
 
-from viewbench import __version__
-from viewbench.common import plugins
-from viewbench.common.errors import UserError, nearest
-from viewbench.common.seeding import generator
-from viewbench.scenes.types import Scene, Split
-from viewbench.selectors._normalise import normalise
-from viewbench.selectors._types import Views
+from .. import __version__
+from ..common import plugins
+from ..common.errors import UserError, nearest
+from ..common.seeding import generator
+from ..common.sources import code_sha256
+from ..scenes.digest import scene_sha256
+from ..scenes.types import Scene, Split
+from ._normalise import normalise
+from ._types import Views
 
 PLAIN = ("random", "uniform", "full")  # selectors that compare nothing
 
 
-def count_of(ratio: float, n: int) -> int:
-    """K = max(1, round(ratio · N)); halves go to the even number, as Python's `round` has it.
+def code_of(selector: str, format_name: str) -> str:
+    """Hash of the source code that a selection by this selector, of a scene read from this format, depends on."""
+    return code_sha256(*modules_of(selector), plugins.source_name("scenes.formats", format_name))
 
-    Raises UserError for a ratio outside (0, 1].
-    """
-    if not 0 < ratio <= 1:
-        raise UserError(f"ratio {ratio} must lie in (0, 1]: it is the share of the {n} training views to choose")
-    return max(1, round(ratio * n))
+
+def modules_of(selector: str) -> tuple[str, str]:
+    """Modules, without what they import, that a selection depends on."""
+    return "selectors._run", plugins.source_name("selectors", selector)
 
 
 def run(
@@ -67,6 +70,8 @@ def run(
     record = {
         "schema": 1,
         "scene": scene.name,
+        "scene_sha256": scene_sha256(scene),
+        "holdout": scene.holdout,
         "selector": selector,
         "parameters": options,
         "seed": seed,
@@ -79,6 +84,9 @@ def run(
             "similarity": similarity_s,
             "select": choice.seconds.get("select", elapsed - similarity_s),
         },
+        "features_sha256": None if views.features is None else hashlib.sha256(views.features.tobytes()).hexdigest(),
+        "code_sha256": code_of(selector, scene.format),
+        "greedy": bool(getattr(plugin, "GREEDY", False)) and not options.get("sample"),
         "viewbench": __version__,
     }
     return record | ({"notes": dict(choice.notes)} if choice.notes else {})

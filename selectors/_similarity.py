@@ -1,4 +1,4 @@
-"""The similarity M of views by position, rotation and semantics (the paper's Table 1 and Eq. 2), given by columns.
+"""The similarity M of views by position, rotation and semantics (the paper's “Distance Measures”), by columns.
 
     M_ij = α f_d(i, j) + β f_a(i, j) + γ f_p(i, j)
 
@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
-from viewbench.common.errors import UserError, nearest
-from viewbench.selectors._types import FACTORS, Views
+from ..common.errors import UserError, nearest
+from ._types import FACTORS, Views
 
 DEFAULTS = {"alpha": 0.7, "beta": 0.2, "sigma": 0.5, "factors": list(FACTORS)}
 CHUNK = 1 << 20  # numbers converted to float64 at a time

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from viewbench.common.errors import UserError, nearest
-from viewbench.selectors._columns import BLOCK
-from viewbench.selectors._sharpness import Preference
-from viewbench.selectors._similarity import Similarity
+from ..common.errors import UserError, nearest
+from ._columns import BLOCK
+from ._sharpness import Preference
+from ._similarity import Similarity
 
 STARTS = ("random", "medoid")
 

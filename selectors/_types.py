@@ -1,8 +1,9 @@
 """What a selector is given and what it gives back.
 
 A selector is one module of this folder: its docstring's first line is its summary, `SEEDED` says whether the seed
-changes the result, `FACTORS` names the factors of the similarity it uses ("pos", "ang", "sem"), `PARAMETERS` holds
-its parameters with their defaults, and
+changes the result, `GREEDY` (False where it is left out) whether the views of a smaller count are the first of those of
+a larger one, so that one run serves every ratio, `FACTORS` names the factors of the similarity it uses ("pos", "ang",
+"sem"), `PARAMETERS` holds its parameters with their defaults, and
 
     select(views: Views, count: int, rng: numpy.random.Generator, **parameters) -> Choice
 
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-FACTORS = ("pos", "ang", "sem")  # Dist3D, Ang3D and DistSem of the paper's Table 1, in this order
+FACTORS = ("pos", "ang", "sem")  # Dist3D, Ang3D and DistSem of the paper's “Distance Measures”, in this order
 
 
 @dataclass(frozen=True)

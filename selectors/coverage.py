@@ -1,18 +1,20 @@
-"""Views that together see every region from every side: the paper's z_CF (Definition 3), after Kopanas and Drettakis.
+"""Views that together see every region from every side: the paper's Uniform Coverage Function z_CF.
 
-What the paper leaves open follows its authors' own code: regions are the nodes of a grid 0.5 apart (positions in
-[-4, 4]) over the cameras' bounding box grown by 20 % on each side; directions fall in 5 × 10 bins (polar × azimuth)
-that count by one over their area; λ = 0.05; a region that nobody sees has no angular term. Nothing is random.
+The measure is that of Kopanas and Drettakis (2023). What the paper leaves open follows its authors' own code: regions
+are the nodes of a grid 0.5 apart (positions in [-4, 4]) over the cameras' bounding box grown by 20 % on each side;
+directions fall in 5 × 10 bins (polar × azimuth) that count by one over their area; λ = 0.05; a region that nobody sees
+has no angular term. Nothing is random.
 """
 
 import time
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.selectors._types import Choice, Views
+from ..common.errors import UserError
+from ._types import Choice, Views
 
 SEEDED = False
+GREEDY = True
 FACTORS = ()
 PARAMETERS = {"lam": 0.05, "spacing": 0.5}
 GROWTH = 0.2  # of the bounding box, on each side
@@ -20,7 +22,9 @@ TIE = 1e-9  # gains that differ by less are the same: many views see equally man
 
 
 def select(views: Views, count: int, rng: np.random.Generator, lam: float = 0.05, spacing: float = 0.5) -> Choice:
-    """Greedy by Eq. 5: the next view k maximises Σ_x c(x)^λ + (1 − TV(x)) over S ∪ {k}, ties to the earlier frame.
+    """Greedy by the gain that the Uniform Coverage Function defines, ties to the earlier frame.
+
+    The next view k maximises Σ_x c(x)^λ + (1 − TV(x)) over S ∪ {k}, with
 
     c(x) = n(x) / |S ∪ {k}|, so the first sum is |S ∪ {k}|^−λ Σ_x n(x)^λ. Adding k changes n and TV only in the regions
     that k sees; the change by region and bin is kept in a table, and the gain of every view as its sum over what it
@@ -29,7 +33,7 @@ def select(views: Views, count: int, rng: np.random.Generator, lam: float = 0.05
 
     Raises UserError without intrinsics and for a λ or a spacing that is not positive.
     """
-    from viewbench.selectors import _coverage_kernels as kernels
+    from . import _coverage_kernels as kernels
 
     if views.intrinsics is None:
         raise UserError("'coverage' needs the cameras' intrinsics to know what they see; use another selector")

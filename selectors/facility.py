@@ -8,12 +8,13 @@ import time
 
 import numpy as np
 
-from viewbench.selectors._columns import BLOCK, Columns
-from viewbench.selectors._sharpness import Preference
-from viewbench.selectors._similarity import describe, similarity
-from viewbench.selectors._types import Choice, Views
+from ._columns import BLOCK, Columns
+from ._sharpness import Preference
+from ._similarity import describe, similarity
+from ._types import Choice, Views
 
 SEEDED = False
+GREEDY = True
 FACTORS = ("pos", "ang", "sem")
 PARAMETERS = {"alpha": 0.7, "beta": 0.2, "sigma": 0.5, "factors": ["pos", "ang", "sem"], "sharpness": 0.0}
 

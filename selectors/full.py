@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.selectors._types import Choice, Views
+from ..common.errors import UserError
+from ._types import Choice, Views
 
 SEEDED = False
+GREEDY = True
 FACTORS = ()
 PARAMETERS: dict = {}
 

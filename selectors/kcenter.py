@@ -2,14 +2,15 @@
 
 import numpy as np
 
-from viewbench.common.errors import UserError, nearest
-from viewbench.selectors._sharpness import Preference
-from viewbench.selectors._similarity import Similarity, similarity
-from viewbench.selectors._start import first
-from viewbench.selectors._types import FACTORS as ALL_FACTORS
-from viewbench.selectors._types import Choice, Views
+from ..common.errors import UserError, nearest
+from ._sharpness import Preference
+from ._similarity import Similarity, similarity
+from ._start import first
+from ._types import FACTORS as ALL_FACTORS
+from ._types import Choice, Views
 
 SEEDED = True
+GREEDY = True
 FACTORS = ("pos",)
 PARAMETERS = {"factors": ["pos"], "start": "random", "sharpness": 0.0}
 

@@ -1,18 +1,19 @@
-"""Views whose similarities have the largest determinant: the paper's z_DPP (Section 4.1)."""
+"""Views whose similarities have the largest determinant: the paper's Log Determinant Function z_DPP."""
 
 import time
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.selectors import _kdpp
-from viewbench.selectors._cholesky import Residuals
-from viewbench.selectors._nearest import Nearest
-from viewbench.selectors._sharpness import Preference
-from viewbench.selectors._similarity import Similarity, describe, similarity
-from viewbench.selectors._types import Choice, Views
+from ..common.errors import UserError
+from . import _kdpp
+from ._cholesky import Residuals
+from ._nearest import Nearest
+from ._sharpness import Preference
+from ._similarity import Similarity, describe, similarity
+from ._types import Choice, Views
 
 SEEDED = True
+GREEDY = True
 FACTORS = ("pos", "ang", "sem")
 PARAMETERS = {
     "alpha": 0.7,
@@ -44,7 +45,8 @@ def select(
     logarithm of its residual, computed by an incremental Cholesky factorisation in O(N K²) time and O(N K) memory.
 
     `regularise` = λ > 0 maximises log det(I + M_S / λ) instead, which is monotone. `sample` draws S from the k-DPP with
-    P(S) ∝ det M_S, as the authors' code does: no greedy order, no gains, and another set for another count.
+    P(S) ∝ det M_S, as the authors' code does for the published z_DPP: no greedy order, no gains, another set for
+    another count. Sampled sets are less spread out than greedy ones.
 
     Where every residual left is below N ε, the rounding of float64, log det says nothing more about what to choose
     (the paper's "unsolvable"). From that pick on, `below_precision_from` in the notes counted from 0, the view least

@@ -1,16 +1,17 @@
-"""Each next view is the one least similar to those already chosen: the paper's z_DF (Definition 2)."""
+"""Each next view is the one least similar to those already chosen: the paper's Max-Min Distance Function z_DF."""
 
 import time
 
 import numpy as np
 
-from viewbench.selectors._nearest import Nearest
-from viewbench.selectors._sharpness import Preference
-from viewbench.selectors._similarity import describe, similarity
-from viewbench.selectors._start import first
-from viewbench.selectors._types import Choice, Views
+from ._nearest import Nearest
+from ._sharpness import Preference
+from ._similarity import describe, similarity
+from ._start import first
+from ._types import Choice, Views
 
 SEEDED = True
+GREEDY = True
 FACTORS = ("pos", "ang", "sem")
 PARAMETERS = {
     "alpha": 0.7,

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from viewbench.selectors._types import Choice, Views
+from ._types import Choice, Views
 
 SEEDED = True
+GREEDY = True
 FACTORS = ()
 PARAMETERS: dict = {}
 

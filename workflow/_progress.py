@@ -117,9 +117,12 @@ def attach(workflow: Any, cells: int) -> None:
 
 
 def _worth_reading(record: logging.LogRecord) -> bool:
-    """Of what Snakemake itself would print: warnings, errors without a job (those of jobs are ours), and the end."""
-    if getattr(record, "event", None) is not None:
-        return False
+    """Of what Snakemake itself would print: warnings, its own errors (those of jobs are ours), and the end."""
+    event = getattr(record, "event", None)
+    if event is not None:
+        # A job's failure is an error of Snakemake's too, which the line with the job's last words says better.
+        of_a_job = getattr(record, "exception", "") == "RuleException" and "CalledProcessError" in str(record.msg)
+        return getattr(event, "name", "") in ("ERROR", "GROUP_ERROR") and not of_a_job
     return record.levelno >= logging.WARNING or "Nothing to be done" in str(record.msg)
 
 

@@ -1,18 +1,20 @@
 """Study files: a grid scenes × selectors × ratios × seeds × backends, checked before anything runs."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from viewbench.common import plugins
-from viewbench.common.errors import UserError, nearest
-from viewbench.common.settings import Settings
-from viewbench.selectors._types import FACTORS
+from ..backends import _registry
+from ..common import plugins
+from ..common.errors import UserError, nearest
+from ..common.settings import Settings
+from ..selectors._types import FACTORS
 
 FOLDER = Path(__file__).resolve().parent
 STUDIES = FOLDER / "studies"
 REFERENCE = "full"
+AXES = ("backend", "scene", "selector", "ratio", "seed")  # the folders of a cell, from the outside
 
 
 @dataclass(frozen=True)
@@ -25,10 +27,17 @@ class SelectorEntry:
 
     @property
     def seeded(self) -> bool:
-        """Whether the seed changes the result; if not, one seed is enough."""
+        """Whether the seed changes the choice; if not, one choice serves the trainings with all seeds."""
         if self.parameters.get("start") == "medoid":
             return False
         return bool(plugins.constant("selectors", self.selector, "SEEDED", True))
+
+    @property
+    def greedy(self) -> bool:
+        """Whether the views of a smaller count are the first of those of a larger one."""
+        if self.parameters.get("sample"):
+            return False
+        return bool(plugins.constant("selectors", self.selector, "GREEDY", False))
 
     @property
     def needs_features(self) -> bool:
@@ -47,6 +56,7 @@ class BackendEntry:
     seconds: float | None
     width: int | None
     options: dict[str, Any] = field(default_factory=dict)
+    grid: dict[str, Any] = field(default_factory=dict)  # the part of the study's grid that it runs; empty for all
 
 
 @dataclass(frozen=True)
@@ -62,6 +72,7 @@ class Study:
     seeds: tuple[int, ...]
     backends: tuple[BackendEntry, ...]
     reference: bool
+    count: str  # how a ratio becomes a number of views: selectors/_run.py
     encoder: str
     reports: tuple[str, ...]
     source: Path
@@ -80,19 +91,29 @@ class Study:
     def cells(self) -> list[dict[str, str]]:
         """One row a cell, all values as the folders under `cells/` spell them.
 
-        A selector without randomness runs with the first seed only, and the full-data reference once.
+        Every selector, and the full-data reference, is trained with every seed: also where the choice is always the
+        same, its score has a spread.
         """
         rows = []
         for backend in self.backends:
-            for scene in self.scenes:
+            part = backend.grid
+            seeds = part.get("seeds", self.seeds)
+            for scene in part.get("scenes", self.scenes):
                 for entry in self.selectors:
-                    seeds = self.seeds if entry.seeded else self.seeds[:1]
-                    for ratio in self.ratios:
-                        for seed in seeds:
-                            rows.append(_row(backend.name, scene, entry.name, ratio, seed))
-                if self.reference:
-                    rows.append(_row(backend.name, scene, REFERENCE, 1.0, 0))
+                    if entry.name in part.get("selectors", [entry.name]):
+                        rows += [
+                            _row(backend.name, scene, entry.name, ratio, seed)
+                            for ratio in part.get("ratios", self.ratios)
+                            for seed in seeds
+                        ]
+                if part.get("reference", self.reference):
+                    rows += [_row(backend.name, scene, REFERENCE, 1.0, seed) for seed in seeds]
         return rows
+
+    def record(self) -> dict[str, Any]:
+        """What `results/STUDY/study.json` records; nothing in it depends on where the file of the study lies."""
+        fields = {key: value for key, value in asdict(self).items() if key != "source"}
+        return {"schema": 1, **fields, "cells": len(self.cells())}
 
 
 def names() -> list[str]:
@@ -124,14 +145,6 @@ def load(study: str, settings: Settings) -> Study:
     return _complete(raw, path, settings)
 
 
-def as_json(study: Study) -> dict[str, Any]:
-    """What `results/STUDY/study.json` records."""
-    from dataclasses import asdict
-
-    record = {key: value for key, value in asdict(study).items() if key != "source"}
-    return {"schema": 1, **record, "cells": len(study.cells())}
-
-
 def _row(backend: str, scene: str, selector: str, ratio: float, seed: int) -> dict[str, str]:
     values = {"backend": backend, "scene": scene, "selector": selector, "ratio": repr(float(ratio)), "seed": str(seed)}
     return values
@@ -139,8 +152,7 @@ def _row(backend: str, scene: str, selector: str, ratio: float, seed: int) -> di
 
 def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
     selectors = tuple(_selector(entry) for entry in raw["selectors"])
-    backends = tuple(_backend(entry, raw) for entry in raw["backends"])
-    seeds = raw["seeds"]
+    backends = tuple(_backend(entry, raw, settings) for entry in raw["backends"])
     reports = [name.replace("_", "-") for name in raw.get("reports", plugins.names("reports"))]
     known_scenes = list(settings.scenes)
     for scene in raw["scenes"]:
@@ -161,6 +173,7 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
         _known("backend", "backends", backend.backend.split(":")[0], path)
         if backend.iterations is None and backend.seconds is None:
             raise UserError(f"study '{path}': backend '{backend.name}' has no budget; give iterations or seconds")
+        _check_grid(backend, raw, [entry.name for entry in selectors], path)
     for kind, entries in (("selector", selectors), ("backend", backends)):
         called = [entry.name for entry in entries]
         twice = next((name for name in called if called.count(name) > 1), None)
@@ -173,9 +186,10 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
         scenes=tuple(raw["scenes"]),
         selectors=selectors,
         ratios=tuple(float(ratio) for ratio in raw["ratios"]),
-        seeds=tuple(range(seeds)) if isinstance(seeds, int) else tuple(seeds),
+        seeds=_seeds(raw["seeds"]),
         backends=backends,
         reference=raw.get("reference", True),
+        count=raw.get("count", "round"),
         encoder=raw.get("encoder", settings.features.encoder),
         reports=tuple(reports),
         source=path,
@@ -188,17 +202,52 @@ def _selector(entry: str | dict) -> SelectorEntry:
     return SelectorEntry(entry.get("name", entry["selector"]), entry["selector"], entry.get("parameters", {}))
 
 
-def _backend(entry: str | dict, raw: dict) -> BackendEntry:
+def _backend(entry: str | dict, raw: dict, settings: Settings) -> BackendEntry:
     entry = {"backend": entry} if isinstance(entry, str) else entry
     budget = entry.get("budget", raw.get("budget", {}))
+    start = {"points": raw["points"]} if "points" in raw and _has_points(entry["backend"], settings) else {}
     return BackendEntry(
         name=entry.get("name", entry["backend"].replace(":", "-")),
         backend=entry["backend"],
         iterations=budget.get("iterations"),
         seconds=budget.get("seconds"),
         width=entry.get("width", raw.get("width")),
-        options=entry.get("options", {}),
+        options={**start, **entry.get("options", {})},
+        grid=_grid(entry.get("grid", {})),
     )
+
+
+def _has_points(name: str, settings: Settings) -> bool:
+    """Whether a backend can be told where to start; False for one that is not there, which is answered elsewhere."""
+    try:
+        return "points" in _registry.load(name, settings).CAPABILITIES.options
+    except UserError:
+        return False
+
+
+def _grid(given: dict[str, Any]) -> dict[str, Any]:
+    grid = dict(given)
+    if "seeds" in grid:
+        grid["seeds"] = list(_seeds(grid["seeds"]))
+    if "ratios" in grid:
+        grid["ratios"] = [float(ratio) for ratio in grid["ratios"]]
+    return grid
+
+
+def _seeds(given: int | list[int]) -> tuple[int, ...]:
+    return tuple(range(given)) if isinstance(given, int) else tuple(given)
+
+
+def _check_grid(backend: BackendEntry, raw: dict, selectors: list[str], path: Path) -> None:
+    """Raises UserError where a backend's part of the grid is none of the study's."""
+    whole = {"scenes": raw["scenes"], "selectors": selectors, "ratios": list(map(float, raw["ratios"]))}
+    for axis, known in {**whole, "seeds": list(_seeds(raw["seeds"]))}.items():
+        for value in backend.grid.get(axis, []):
+            if value not in known:
+                raise UserError(
+                    f"study '{path}': the grid of backend '{backend.name}' has {axis[:-1]} {value!r}, which the study "
+                    f"does not have{nearest(str(value), map(str, known))}"
+                )
 
 
 def _known(kind: str, package: str, name: str, path: Path) -> None:

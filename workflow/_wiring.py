@@ -1,6 +1,8 @@
-"""What the rules ask: paths, inputs and command-line options of a cell, from the study and the settings."""
+"""What the rules ask: paths, inputs and command-line options of a job, from the study and the settings."""
 
 import contextlib
+import functools
+import hashlib
 import re
 import shlex
 from collections.abc import Iterator
@@ -8,17 +10,23 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from snakemake.exceptions import WorkflowError
-from snakemake.utils import Paramspace
 
-from viewbench.backends import _registry
-from viewbench.common import plugins
-from viewbench.common.errors import UserError
-from viewbench.common.settings import PACKAGE, Settings
-from viewbench.reports._tracking import is_remote
-from viewbench.workflow._sources import from_here, listing, sources
-from viewbench.workflow._study import Study
+from ..backends import _evaluate, _registry, _train
+from ..common import plugins
+from ..common.errors import UserError
+from ..common.files import sha256_file
+from ..common.settings import PACKAGE, Settings
+from ..reports._tracking import is_remote
+from ..selectors import _run
+from ._depends import Lists
+from ._study import AXES, Study
+
+# Installed packages whose version may change a step's numbers; a backend's version names its own.
+CHOOSING = ("numpy", "scipy", "numba")
+READING = ("numpy", "pillow")  # and drawing to a smaller size
+SCORING = ("numpy", "scikit-image", "pillow", "lpips")
+TIERS = (0.25, 0.5, 1.0)  # a greedy order is made up to the next of these ratios, whichever of them a study asks for
 
 
 @contextlib.contextmanager
@@ -30,52 +38,56 @@ def explained() -> Iterator[None]:
         raise WorkflowError(str(error)) from None
 
 
-class CellSpace(Paramspace):
-    """A Paramspace whose folders are the plain values, BACKEND/SCENE/SELECTOR/RATIO/SEED."""
-
-    @property
-    def wildcard_pattern(self) -> str:
-        return "/".join(f"{{{column}}}" for column in self.ordered_columns)
-
-    @property
-    def instance_patterns(self) -> Iterator[str]:
-        return ("/".join(row) for row in self.dataframe.itertuples(index=False))
-
-
 class Wiring:
     """Answers for one study; methods that take `wildcards` are input and parameter functions of the rules."""
 
-    def __init__(self, study: Study, settings: Settings):
+    def __init__(self, study: Study, settings: Settings, writes: bool = True):
         self.study, self.settings = study, settings
         self.results = f"results/{study.name}"
-        self.cells = CellSpace(pd.DataFrame(study.cells(), dtype=str))
-        self._files: dict[str, list[str]] = {}
-
-    def sources(self, step: str, *modules: str, also: tuple[str, ...] = ()) -> str:
-        """The file that lists what a step made of these modules depends on, and the files `also`."""
-        return listing(Path(self.results) / "sources" / f"{step}.txt", [*sources(*modules), *also])
+        self.cells = study.cells()
+        self.lists = Lists(Path(self.results) / "depends", writes)
 
     @property
-    def study_file(self) -> str:
-        """The file that the study was read from."""
-        return from_here(self.study.source)
+    def cell_patterns(self) -> list[str]:
+        """BACKEND/SCENE/SELECTOR/RATIO/SEED of every cell."""
+        return ["/".join(cell[axis] for axis in AXES) for cell in self.cells]
 
     def alternatives(self, column: str) -> str:
         """Regular expression of the values that a wildcard can take."""
-        values = self.study.reports if column == "report" else sorted(set(self.cells.dataframe[column]))
+        values = self.study.reports if column == "report" else sorted({cell[column] for cell in self.cells})
         return "|".join(re.escape(value) for value in values)
 
-    def scene_files(self, wildcards: Any) -> list[str]:
-        """Everything that a scene was read from: its metadata, its images and the reader itself."""
-        if wildcards.scene not in self._files:
-            from viewbench.scenes.load import open_scene
+    def command(self, name: str) -> str:
+        """What a step depends on that is one command and nothing else."""
+        return self.lists.path(name, (f"workflow.commands.{name}",))
 
-            with explained():
-                scene = open_scene(wildcards.scene, self.settings)
-            images = [path for split in (scene.train, scene.test) for path in split.paths]
-            reader = self.sources(f"read-{scene.format}", _module("scenes.formats", scene.format))
-            self._files[wildcards.scene] = [*map(from_here, [*scene.files, *images]), reader]
-        return self._files[wildcards.scene]
+    # Scenes
+
+    @functools.cache  # noqa: B019 - one object a run
+    def _scene(self, name: str) -> tuple[str, str, str]:
+        """Format, holdout and hash of a scene."""
+        from ..scenes.digest import scene_sha256
+        from ..scenes.load import open_scene
+
+        with explained():
+            scene = open_scene(name, self.settings)
+            return scene.format, scene.holdout, scene_sha256(scene)
+
+    def scene(self, wildcards: Any) -> str:
+        """What a scene is: its content, its test split, and the code that reads it."""
+        name = wildcards.scene
+        if not self.lists.writes:
+            return self.lists.path(f"scene-{name}")
+        format_name, holdout, sha256 = self._scene(name)
+        return self.lists.path(
+            f"scene-{name}",
+            ("scenes.load", plugins.source_name("scenes.formats", format_name)),
+            {"format": format_name, "holdout": holdout, "sha256": sha256},
+        )
+
+    def dataset(self, wildcards: Any) -> str:
+        """The group that the scene's tables put it in."""
+        return self.settings.scenes[wildcards.scene].dataset
 
     @cached_property
     def truth_width(self) -> int:
@@ -83,12 +95,17 @@ class Wiring:
         widths = [entry.width for entry in self.study.backends if entry.width]
         return max(widths, default=256)
 
-    @property
-    def encoder_module(self) -> str:
-        """Module of the study's encoder."""
-        family = self.study.encoder.split(":")[0]
-        plugins.load("scenes.encoders", family)
-        return _module("scenes.encoders", family)
+    @cached_property
+    def encoder(self) -> str:
+        """What the features depend on besides the pictures."""
+        family, _, argument = self.study.encoder.partition(":")
+        with explained():
+            module = plugins.load("scenes.encoders", family)
+            made_by = module.version(argument) if hasattr(module, "version") else ""
+        modules = ("workflow.commands.features", plugins.source_name("scenes.encoders", family))
+        return self.lists.path("features", modules, {"encoder": self.study.encoder, "version": made_by}, READING)
+
+    # Selections
 
     def features(self, wildcards: Any) -> list[str]:
         """The scene's features, where the selector uses them."""
@@ -97,15 +114,29 @@ class Wiring:
             return []
         return [f"{self.results}/features/{wildcards.scene}.npy"]
 
-    def selector_sources(self, wildcards: Any) -> str:
-        """Files behind a selection."""
+    def choosing(self, wildcards: Any) -> str:
+        """What a selection depends on besides scene, features and options."""
         selector = self.study.selector(wildcards.selector).selector
-        return self.sources(f"select-{selector}", "workflow.commands.select", _module("selectors", selector))
+        modules = ("workflow.commands.select", *_run.modules_of(selector))
+        return self.lists.path(f"select-{selector}", modules, packages=CHOOSING)
+
+    def selection(self, wildcards: Any) -> str:
+        """The file with a cell's choice: one for all ratios of a tier where the order is greedy, one for all backends
+        and, where the selector has no randomness, for all seeds."""
+        entry = self.study.selector(wildcards.selector)
+        seed = wildcards.seed if entry.seeded else self.study.seeds[0]
+        ratio = float(wildcards.ratio)
+        part = next(tier for tier in TIERS if ratio <= tier) if entry.greedy else ratio
+        return f"{self.results}/selections/{wildcards.scene}/{wildcards.selector}/{part!r}/{seed}.json"
+
+    def selection_patterns(self) -> list[str]:
+        """Every file of selections."""
+        return sorted({self.selection(_Cell(cell)) for cell in self.cells})
 
     def selector_options(self, wildcards: Any) -> str:
-        """Options of `viewbench select` for the cell's selector."""
+        """Options of `viewbench select` for the selector."""
         entry = self.study.selector(wildcards.selector)
-        options = _set_options(entry.parameters)
+        options = _set_options(entry.parameters) + ["--count-rule", self.study.count]
         features = self.features(wildcards)
         if features:
             options += ["--features", features[0]]
@@ -113,44 +144,88 @@ class Wiring:
             options += ["--encoder", "none"]
         return shlex.join(options)
 
-    def _family(self, wildcards: Any) -> str:
-        return self.study.backend(wildcards.backend).backend.split(":")[0]
+    # Models
 
-    def backend_sources(self, wildcards: Any) -> str:
-        """Files behind a training run."""
-        family = self._family(wildcards)
-        return self.sources(f"train-{family}", "workflow.commands.train", _module("backends", family))
+    @functools.cache  # noqa: B019
+    def _backend(self, name: str) -> Any:
+        with explained():
+            return _registry.load(name, self.settings)
 
-    def warm_sources(self, wildcards: Any) -> str:
-        """Files behind a backend's compiled kernels."""
-        family = self._family(wildcards)
-        return self.sources(f"warm-{family}", "workflow.commands.warm", _module("backends", family))
+    @functools.cache  # noqa: B019
+    def _facts(self, name: str) -> dict[str, Any]:
+        """Version and configuration of a backend; where a version cannot be found out, the jobs will say why."""
+        backend = self._backend(name)
+        try:
+            version = backend.version()
+        except UserError as error:
+            version = f"unknown: {error}"
+        return {"version": version, "train": {}, "render": {}} | getattr(backend, "configuration", dict)()
+
+    def training(self, wildcards: Any) -> str:
+        """What a training depends on besides scene, selection and options."""
+        name = self.study.backend(wildcards.backend).backend
+        step = f"train-{name.replace(':', '-')}"
+        if not self.lists.writes:
+            return self.lists.path(step)
+        facts = self._facts(name)
+        modules = ("workflow.commands.train", *_train.modules_of(name))
+        return self.lists.path(step, modules, {"version": facts["version"], "configuration": facts["train"]}, READING)
+
+    def scoring(self, wildcards: Any) -> str:
+        """What a score depends on besides scene and model."""
+        name = self.study.backend(wildcards.backend).backend
+        step = f"evaluate-{name.replace(':', '-')}"
+        if not self.lists.writes:
+            return self.lists.path(step)
+        modules = ("workflow.commands.evaluate", *_evaluate.modules_of(name, self._backend(name)))
+        values = {"configuration": self._facts(name)["render"], "lpips": self._lpips}
+        return self.lists.path(step, modules, values, SCORING)
+
+    @cached_property
+    def _lpips(self) -> str | None:
+        """Hash of the weights of LPIPS; None without them."""
+        from ..backends._metrics import lpips_weights
+
+        with explained():
+            weights = lpips_weights(self.settings.metrics.lpips_weights)
+        return None if weights is None else sha256_file(weights)
 
     def backend_options(self, wildcards: Any) -> str:
         """Options of `viewbench train` for the cell's backend."""
         entry = self.study.backend(wildcards.backend)
         limits = {"--iterations": entry.iterations, "--seconds": entry.seconds, "--width": entry.width}
         options = [str(part) for flag, value in limits.items() if value is not None for part in (flag, value)]
-        return shlex.join(options + _set_options(entry.options))
+        return shlex.join([*options, "--count-rule", self.study.count, *_set_options(entry.options)])
 
     def gpu(self, wildcards: Any) -> int:
         """GPUs that a job needs, for `snakemake --resources gpu=1`."""
         name = self.study.backend(wildcards.backend).backend
-        return int(_registry.load(name, self.settings).CAPABILITIES.device == "cuda")
+        return int(self._backend(name).CAPABILITIES.device == "cuda")
 
-    def report_sources(self, wildcards: Any) -> str:
-        """Files behind a report: its module and the numbers that ship with it (`reports/NAME/*`)."""
-        module = _module("reports", wildcards.report)
-        data = PACKAGE.joinpath(*module.split("."))
-        files = sorted(from_here(path) for path in data.rglob("*") if path.is_file() and path.suffix != ".pyc")
-        return self.sources(f"report-{wildcards.report}", module, also=tuple(files))
+    # Reports
 
     @property
-    def page_sources(self) -> str:
-        """Files behind the page: its modules and its template."""
-        templates = (PACKAGE / "reports" / "templates").iterdir()
-        files = sorted(from_here(path) for path in templates if path.is_file())
-        return self.sources("page", "workflow.commands.report", "reports._page", also=tuple(files))
+    def study_file(self) -> str:
+        """The study as it was checked: what it says, wherever its file lies."""
+        return self.lists.path("study", ("workflow.commands.study",), {"study": self.study.record()})
+
+    def report(self, wildcards: Any) -> str:
+        """What a report depends on: its module and the numbers that ship with it (`reports/NAME/*`)."""
+        module = plugins.source_name("reports", wildcards.report)
+        data = PACKAGE.joinpath(*module.split("."))
+        return self.lists.path(f"report-{wildcards.report}", (module,), _contents(data), ("matplotlib",))
+
+    @property
+    def page(self) -> str:
+        """What the page depends on: its modules and its template."""
+        modules = ("workflow.commands.report", "reports._page")
+        return self.lists.path("page", modules, _contents(PACKAGE / "reports" / "templates"))
+
+    @property
+    def tracking(self) -> str:
+        """Where runs are logged to; hashed, since an address may hold a password."""
+        asked = self.settings.tracking
+        return hashlib.sha256(repr((asked.uri, asked.artifacts, asked.renders)).encode()).hexdigest()[:16]
 
     @property
     def tracks_as_it_goes(self) -> bool:
@@ -158,8 +233,17 @@ class Wiring:
         return is_remote(self.settings.tracking.uri)
 
 
-def _module(package: str, name: str) -> str:
-    return plugins.module_name(package, name).removeprefix("viewbench.")
+class _Cell:
+    """A cell as a rule's wildcards have it."""
+
+    def __init__(self, cell: dict[str, str]):
+        self.scene, self.selector, self.ratio, self.seed = (cell[key] for key in ("scene", "selector", "ratio", "seed"))
+
+
+def _contents(folder: Path) -> dict[str, str]:
+    """Hashes of the files in a folder, compiled ones aside; nothing where there is no such folder."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc")
+    return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files}
 
 
 def _set_options(values: dict[str, Any]) -> list[str]:

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.backends import _gaussian_ply
-from viewbench.backends._seeding import seed_points
-from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json, write_json
-from viewbench.common.settings import Settings
-from viewbench.scenes.types import Cameras
+from ...common.errors import UserError
+from ...common.files import read_json, write_json
+from ...common.settings import Settings
+from ...scenes.types import Cameras
+from .. import _gaussian_ply
+from .._seeding import seed_points
+from .._types import Budget, Capabilities, Report, Trained, TrainingSet
 
 MODEL = "model.ply"
 RECORD = "model.json"
@@ -84,19 +84,19 @@ class Gsplat:
         Raises UserError for an option out of its range, points that the scene does not have, and when the GPU's
         memory is full.
         """
-        from viewbench.backends.gsplat.trainer import Task, fit
+        from .trainer import Task, fit
 
         _check(options)
         rng = np.random.default_rng(seed)
         xyz, rgb, seeding = seed_points(data, options["points"], rng, options["random_points"])
         task = Task(data, seed, budget, options, report)
-        gaussians, trained = fit(task, xyz, rgb, self.device, self.rasterizer())
+        gaussians, near, trained = fit(task, xyz, rgb, self.device, self.rasterizer())
         _gaussian_ply.save(out / MODEL, gaussians)
-        write_json(out / RECORD, {"background": options["background"], "near": data.near})
+        write_json(out / RECORD, {"background": options["background"], "near": near})
         return Trained(seeding=seeding, **trained)
 
     def render(self, model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
-        from viewbench.backends.gsplat.renderer import Renderer
+        from .renderer import Renderer
 
         record = read_json(model / RECORD, "model record")
         gaussians = _gaussian_ply.load(model / MODEL)

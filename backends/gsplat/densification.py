@@ -5,8 +5,8 @@ from typing import Any
 
 import torch
 
-from viewbench.backends.gsplat.gaussians import Optimizers, Parameters
-from viewbench.common.errors import UserError
+from ...common.errors import UserError
+from .gaussians import Optimizers, Parameters
 
 PAPER_STEPS = 30_000  # the run that the 3DGS authors' schedules are made for; shorter ones are squeezed
 MCMC_REGULARISATION = 0.01  # weight of mean opacity and of mean scale in 3DGS-MCMC

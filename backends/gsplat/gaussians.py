@@ -5,8 +5,7 @@ import math
 import numpy as np
 import torch
 
-from viewbench.backends._gaussian_ply import Gaussians
-from viewbench.scenes.types import Cameras
+from .._gaussian_ply import Gaussians
 
 C0 = 0.28209479177387814  # the constant spherical harmonic, 1 / (2 √π): colour = 0.5 + C0 · coefficient
 NEIGHBOURS = 3
@@ -62,12 +61,3 @@ def optimizers(params: Parameters, extent: float) -> Optimizers:
     """One Adam with one group for each parameter, which is what gsplat's strategies edit when Gaussians come and go."""
     rates = {**RATES, "means": RATES["means"] * extent}
     return {name: torch.optim.Adam([params[name]], lr=rates[name], eps=1e-15) for name in params}
-
-
-def scene_extent(cameras: Cameras) -> float:
-    """1.1 times the largest distance of a chosen camera from their mean, in scene units, as the 3DGS authors take it.
-
-    One camera alone (or several at one place) has none; 1 scene unit then.
-    """
-    positions = cameras.positions
-    return 1.1 * float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max()) or 1.0

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from viewbench.backends._gaussian_ply import Gaussians
-from viewbench.backends.gsplat.gaussians import Parameters, parameters
-from viewbench.scenes.types import Cameras
+from ...scenes.types import Cameras
+from .._gaussian_ply import Gaussians
+from .gaussians import Parameters, parameters
 
 NEAR = 0.01  # scene units, gsplat's own default
 BACKGROUNDS = {"black": 0.0, "white": 1.0}

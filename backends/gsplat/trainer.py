@@ -8,23 +8,24 @@ from typing import Any
 import numpy as np
 import torch
 
-from viewbench.backends._gaussian_ply import Gaussians
-from viewbench.backends._types import Budget, Report, TrainingSet
-from viewbench.backends.gsplat.densification import PAPER_STEPS, Densification
-from viewbench.backends.gsplat.gaussians import (
+from ...common.errors import UserError
+from .._gaussian_ply import Gaussians
+from .._surroundings import surroundings
+from .._types import Budget, Report, TrainingSet
+from .densification import PAPER_STEPS, Densification
+from .gaussians import (
     MEANS_DECAY,
     Parameters,
     arrays,
     optimizers,
-    scene_extent,
     starting,
 )
-from viewbench.backends.gsplat.loss import loss
-from viewbench.backends.gsplat.renderer import Renderer
-from viewbench.common.errors import UserError
+from .loss import loss
+from .renderer import Renderer
 
 SH_EVERY = 1000  # steps of PAPER_STEPS after which one more band of spherical harmonics takes part
 CURVE_POINTS = 20
+NEAR = 0.25  # near plane, share of the depth that next to nothing is nearer than
 RESIDENT_SHARE = 0.25  # of the free GPU memory that images may take; above, each is sent when it is used
 
 
@@ -41,16 +42,17 @@ class Task:
 
 def fit(
     task: Task, xyz: np.ndarray, rgb: np.ndarray, device: str, rasterize: Callable
-) -> tuple[Gaussians, dict[str, Any]]:
-    """Trains from the points `xyz` (P, 3), `rgb` (P, 3) uint8; returns the Gaussians and fields of `Trained`.
+) -> tuple[Gaussians, float, dict[str, Any]]:
+    """Trains from the points `xyz` (P, 3), `rgb` (P, 3) uint8; returns Gaussians, near plane and fields of `Trained`.
 
     A run limited by seconds alone follows the schedule of 30,000 steps as far as it gets.
     Raises UserError when the device's memory is full.
     """
     torch.manual_seed(task.seed)
     data, options = task.data, task.options
-    extent = scene_extent(data.cameras)
-    renderer = Renderer(rasterize, device, options["background"], data.near)
+    around = surroundings(data.training, None if options["points"] == "random" else data.points)
+    extent = around.extent
+    renderer = Renderer(rasterize, device, options["background"], NEAR * around.nearest)
     params = renderer.parameters(starting(xyz, rgb, options["strategy"], options["sh_degree"], extent))
     try:
         run = _run(task, params, extent, renderer)
@@ -61,7 +63,8 @@ def fit(
         ) from None
     used = torch.cuda.get_device_name(device) if device.startswith("cuda") else device
     found = {"n_primitives": len(params["means"]), "device": used, "threads": torch.get_num_threads()}
-    return arrays(params), {**run, **found}
+    found["peak_gpu_bytes"] = torch.cuda.max_memory_allocated(device) if device.startswith("cuda") else None
+    return arrays(params), renderer.near, {**run, **found}
 
 
 def _run(task: Task, params: Parameters, extent: float, renderer: Renderer) -> dict[str, Any]:

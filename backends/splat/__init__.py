@@ -1,16 +1,17 @@
 """3D Gaussian splatting on the CPU, one thread: trains from points, writes a model.ply that any splat viewer opens."""
 
+import importlib.metadata
 import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from viewbench.backends._types import Budget, Capabilities, Report, Trained, TrainingSet
-from viewbench.backends.splat.options import Options, Rendering, defaults
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json
-from viewbench.scenes.types import Cameras
+from ...common.errors import UserError
+from ...common.files import read_json
+from ...scenes.types import Cameras
+from .._types import Budget, Capabilities, Report, Trained, TrainingSet
+from .options import Options, Rendering, defaults
 
 CAPABILITIES = Capabilities(device="cpu", resumes=True, default_iterations=3000, options=defaults())
 
@@ -21,30 +22,30 @@ def available() -> str | None:
 
 
 def version() -> str:
-    """Of viewbench: the kernels are its own."""
-    from viewbench import __version__
+    """Of viewbench, whose own the kernels are, and of what compiles them."""
+    from ... import __version__
 
-    return f"viewbench {__version__}"
+    return f"viewbench {__version__}, numba {importlib.metadata.version('numba')}"
 
 
 def warm() -> None:
     """Compiles every kernel into numba's cache; a second call takes a fraction of a second."""
-    from viewbench.backends.splat.warmup import compile_kernels
+    from .warmup import compile_kernels
 
     compile_kernels()
 
 
 def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict, report: Report) -> Trained:
     """Trains on the chosen views and fills `out` with model.ply and what rendering needs beside it."""
-    from viewbench.backends.splat.loop import train as run
+    from .loop import train as run
 
     return run(data, out, seed, budget, options, report)
 
 
 def render(model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
     """(H, W, 3) float32 pictures of a trained model. Raises UserError for a model that is missing or broken."""
-    from viewbench.backends.splat import ply
-    from viewbench.backends.splat.loop import draw
+    from . import ply
+    from .loop import draw
 
     settings = read_json(model / "splat.json", "splat settings")
     try:

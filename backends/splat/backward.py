@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from viewbench.backends.splat.harmonics import MOST, colour, fill_basis
-from viewbench.backends.splat.kernels import HALF, ONE, TWO, ZERO, F, compiled, exp, sigmoid
-from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0
-from viewbench.backends.splat.projection import (
+from .harmonics import MOST, colour, fill_basis
+from .kernels import HALF, ONE, TWO, ZERO, F, compiled, exp, sigmoid
+from .layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0
+from .projection import (
     FAINTEST,
     FX,
     FY,

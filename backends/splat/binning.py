@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from viewbench.backends.splat.kernels import HALF, ONE, ZERO, F, compiled
-from viewbench.backends.splat.projection import (
+from .kernels import HALF, ONE, ZERO, F, compiled
+from .projection import (
     CONIC_A,
     CONIC_B,
     CONIC_C,

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewbench.backends._types import TrainingSet
-from viewbench.backends.splat.neighbours import neighbours, visible
-from viewbench.backends.splat.plane_sweep import sweep
-from viewbench.backends.splat.shrink import cameras_shrunk, images_shrunk
-from viewbench.scenes.types import Cameras
+from ...scenes.types import Cameras
+from .._types import TrainingSet
+from .neighbours import neighbours
+from .plane_sweep import sweep
+from .shrink import cameras_shrunk, images_shrunk
 
 SIDE = 64  # pixels: about the geometric mean of the sides of the pictures that are compared
 PLANES = 48
@@ -20,8 +20,6 @@ LEAST_SCORE = 0.7  # correlation of a depth that is believed
 WITNESSES, AGREEING = 8, 2  # of so many other views, so many must have found the same depth by themselves,
 TOLERANCE = 0.06  # relative
 LEAST_SURE = 0.02  # share of a view's depths that are believed, below which the others are not guessed from them
-WIDEST = 0.05, 20.0  # depths that are tried where the scene has no points, as multiples of the cameras' extent
-BEYOND_POINTS = 0.5, 3.0  # and where it has, as multiples of their nearest and farthest: mirrors and windows are deeper
 
 
 @dataclass(frozen=True)
@@ -46,15 +44,18 @@ class DepthMaps:
         return positions, self.images[view, row, column].astype(np.float64)
 
 
-def depth_maps(data: TrainingSet, extent: float, rng: np.random.Generator) -> DepthMaps:
-    """Depth maps of the chosen views, all of them or VIEWS evenly chosen ones; `extent` in scene units."""
+def depth_maps(data: TrainingSet, depths: tuple[float, float], rng: np.random.Generator) -> DepthMaps:
+    """Depth maps of the chosen views, all of them or VIEWS evenly chosen ones.
+
+    `depths` are the nearest and the farthest that are tried, in scene units.
+    """
     k, height, width, _ = data.images.shape
     shrink = max(1, round(math.sqrt(height * width) / SIDE))
     images = images_shrunk(data.images, shrink)
     cameras = cameras_shrunk(data.cameras, shrink)
     views = np.unique(np.linspace(0, k - 1, min(k, VIEWS)).round().astype(np.int64))
-    near, far = _range(data, extent)
-    depths = np.geomspace(near, far, PLANES)
+    near, far = depths
+    planes = np.geomspace(near, far, PLANES)
     grey = np.ascontiguousarray(images.mean(axis=-1, dtype=np.float32))
     inner, w2c = _intrinsics(cameras), cameras.world_to_camera()
     sources, value = neighbours(cameras, views, SOURCES, near, far, rng)
@@ -68,27 +69,11 @@ def depth_maps(data: TrainingSet, extent: float, rng: np.random.Generator) -> De
         homographies = np.empty((len(use), 3, 4))
         homographies[:, :, :3] = inner[use] @ relative[:, :3, :3] @ np.linalg.inv(inner[i])
         homographies[:, :, 3] = np.einsum("sab,sb->sa", inner[use], relative[:, :3, 3])
-        sweep(grey[i], grey[use], homographies, depths, depth[row], score[row])
+        sweep(grey[i], grey[use], homographies, planes, depth[row], score[row])
     believed = DepthMaps(cameras[views], images[views], depth, score > LEAST_SCORE, np.zeros(depth.shape, bool))
     believed.sure[:] &= _agreed(believed, near, far, rng)
     _guess(believed)
     return believed
-
-
-def _range(data: TrainingSet, extent: float) -> tuple[float, float]:
-    """Nearest and farthest depth to be tried."""
-    near, far = WIDEST[0] * extent, WIDEST[1] * extent
-    if data.points is not None:
-        xyz = data.points.xyz[np.isfinite(data.points.xyz).all(axis=1)]
-        xyz = xyz[:: max(1, len(xyz) // 2000)]
-        if len(xyz):
-            w2c = data.cameras.world_to_camera()
-            z = np.einsum("kb,nb->kn", w2c[:, 2, :3], xyz) + w2c[:, 2, 3:]
-            z = z[visible(xyz, w2c, data.cameras)]
-            if len(z) > 100:
-                first, last = np.quantile(z, [0.01, 0.99])
-                near, far = BEYOND_POINTS[0] * float(first), BEYOND_POINTS[1] * float(last)
-    return near, far
 
 
 def _agreed(maps: DepthMaps, near: float, far: float, rng: np.random.Generator) -> np.ndarray:

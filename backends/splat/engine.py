@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from viewbench.backends.splat.backward import adam, project_backward, regularise
-from viewbench.backends.splat.binning import TILE, fill_tiles, sort_visible
-from viewbench.backends.splat.kernels import F
-from viewbench.backends.splat.layout import rows
-from viewbench.backends.splat.loss import Planes, loss
-from viewbench.backends.splat.options import Rendering
-from viewbench.backends.splat.projection import EXTENT_COLUMNS, SPLAT_COLUMNS, project
-from viewbench.backends.splat.raster import PAIR_COLUMNS, render, render_backward
+from .backward import adam, project_backward, regularise
+from .binning import TILE, fill_tiles, sort_visible
+from .kernels import F
+from .layout import rows
+from .loss import Planes, loss
+from .options import Rendering
+from .projection import EXTENT_COLUMNS, SPLAT_COLUMNS, project
+from .raster import PAIR_COLUMNS, render, render_backward
 
 
 class Engine:
@@ -48,8 +48,10 @@ class Engine:
         """(3, H, W) picture of all columns of `gaussians`; valid until the next call."""
         n = gaussians.shape[1]
         if len(gaussians) != len(self.gradient):
-            # The kernels do not check bounds.
+            # The kernels check no bounds: beyond them is other memory.
             raise ValueError(f"{len(gaussians)} rows of parameters, made for {len(self.gradient)}")
+        if n > len(self.splats):
+            raise ValueError(f"{n} Gaussians, made for at most {len(self.splats)}; resize the engine")
         project(gaussians, n, camera, self.degree, self.near, self.low_pass, self.antialias, self.splats, self.extents)
         visible = sort_visible(n, self.extents, self.order, self.scratch, self.keys, self.scratch_keys)
         while True:
@@ -99,6 +101,8 @@ class Engine:
             self.pair_gradient,
         )
         n = gaussians.shape[1]
+        if n > len(self.splats) or len(gaussians) != len(self.gradient):
+            raise ValueError(f"the picture was not drawn of these {n} Gaussians; draw it first")
         project_backward(
             gaussians,
             n,

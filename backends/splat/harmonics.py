@@ -3,8 +3,8 @@
 √2 Im Yₗ^|m| for m < 0, Yₗ⁰, √2 Re Yₗ^m for m > 0, with the Condon-Shortley phase; m from -l to l.
 """
 
-from viewbench.backends.splat.kernels import HALF, ONE, F, inlined
-from viewbench.backends.splat.layout import SH0, SH_C0
+from .kernels import HALF, ONE, F, inlined
+from .layout import SH0, SH_C0
 
 MOST = 16  # basis functions
 C0 = F(SH_C0)

@@ -7,18 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.backends._types import Budget, Report, Trained, TrainingSet
-from viewbench.backends.splat import layout, ply
-from viewbench.backends.splat.engine import Engine
-from viewbench.backends.splat.options import Options, Rendering
-from viewbench.backends.splat.projection import camera_vectors
-from viewbench.backends.splat.relocate import relocate
-from viewbench.backends.splat.seeding import camera_extent, seed
-from viewbench.backends.splat.snapshot import State
-from viewbench.backends.splat.stages import Stage, halved
-from viewbench.common.errors import UserError
-from viewbench.common.files import write_json
-from viewbench.scenes.types import Cameras
+from ...common.errors import UserError
+from ...common.files import write_json
+from ...scenes.types import Cameras
+from .._surroundings import surroundings
+from .._types import Budget, Report, Trained, TrainingSet
+from . import layout, ply
+from .engine import Engine
+from .options import Options, Rendering
+from .projection import camera_vectors
+from .relocate import relocate
+from .seeding import known_points, seed
+from .snapshot import State
+from .stages import Stage, halved
 
 CURVE_POINTS = 10
 ROUND = 100  # steps that the loss of a point of the curve is averaged over, at most
@@ -34,16 +35,17 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
     entered = time.perf_counter()
     o = Options(**options)
     _check(data)
+    data = dataclasses.replace(data, points=known_points(data, o.points))
+    around = surroundings(data.training, data.points)
     views = len(data.images)
     rng = np.random.default_rng(seed_)
-    gaussians, seeding = seed(data, o, rng)
+    gaussians, seeding = seed(data, o, around, rng)
     if views < 2 and not seeding["scene_points"]:
         raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
-    extent = camera_extent(data)
-    rendering = Rendering(o.near * extent, o.background, o.degree, o.low_pass, o.antialias)
+    rendering = Rendering(o.near * around.nearest, o.background, o.degree, o.low_pass, o.antialias)
     full = Stage(data.images, data.cameras, gaussians.shape[1], rendering)
     coarse = halved(data, gaussians.shape[1], rendering) if o.coarse else None
-    first_rates, last = _rates(o, extent)
+    first_rates, last = _rates(o, around.extent)
     weights = o.opacity_weight / gaussians.shape[1], o.scale_weight / gaussians.shape[1]
     # A step on copies loads the kernels, which is set-up and not training.
     moments = np.zeros_like(gaussians), np.zeros_like(gaussians)

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from viewbench.scenes.types import Cameras
+from ...scenes.types import Cameras
+from .._surroundings import visible
 
 ANGLE, NARROWER, WIDER = 8.0, 4.0, 14.0  # degrees between two rays: best to match, and how fast others are worse
 SAMPLES = 96  # points in a view's frustum
@@ -38,13 +39,3 @@ def neighbours(
         best[row] = np.argsort(-weight, kind="stable")[: best.shape[1]]
         value[row] = weight[best[row]]
     return best, value
-
-
-def visible(points: np.ndarray, w2c: np.ndarray, cameras: Cameras) -> np.ndarray:
-    """(K, N) bool: which of the points (N, 3) lie in the frames of the cameras, (K, 4, 4) world-to-camera."""
-    seen = np.einsum("kab,nb->kna", w2c[:, :3, :3], points) + w2c[:, None, :3, 3]
-    z = np.where(seen[..., 2] > 1e-9, seen[..., 2], np.inf)
-    u = cameras.fx[:, None] * seen[..., 0] / z + cameras.cx[:, None]
-    v = cameras.fy[:, None] * seen[..., 1] / z + cameras.cy[:, None]
-    in_frame = (u > 0) & (v > 0) & (u < cameras.width[:, None]) & (v < cameras.height[:, None])
-    return np.isfinite(z) & in_frame

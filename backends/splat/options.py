@@ -3,12 +3,12 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
-from viewbench.common.errors import UserError
+from ...common.errors import UserError
 
 
 @dataclass(frozen=True)
 class Options:
-    """Hyperparameters; rates are per step, those of positions times the cameras' extent.
+    """Hyperparameters; rates are per step, those of positions times the extent of all training cameras.
 
     Raises UserError for a value out of its limits.
     """
@@ -36,7 +36,7 @@ class Options:
     scale_weight: float = 0.0
     relocate_every: int = 100
     relocate_until: float = 0.85  # share of the budget; 0 never relocates
-    near: float = 0.05  # near plane, share of the cameras' extent
+    near: float = 0.25  # near plane, share of the depth that next to nothing is nearer than
     background: float = 0.0  # grey level behind everything
 
     def __post_init__(self) -> None:

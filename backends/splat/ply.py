@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.backends import _gaussian_ply
-from viewbench.backends.splat.layout import HIGHEST, LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0, SH1, empty
-from viewbench.common.errors import UserError
+from ...common.errors import UserError
+from .. import _gaussian_ply
+from .layout import HIGHEST, LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0, SH1, empty
 
 
 def write(path: Path, gaussians: np.ndarray) -> None:

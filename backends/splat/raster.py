@@ -9,9 +9,9 @@ from the forward pass, so the part of it that lies behind splat i is found by su
 
 import numpy as np
 
-from viewbench.backends.splat.binning import TILE
-from viewbench.backends.splat.kernels import HALF, ONE, ZERO, F, compiled, exp2_8
-from viewbench.backends.splat.projection import BLUE, GREEN, LOG2_OPACITY, MIN_ALPHA_LOG2, RED, A, B, C, X, Y
+from .binning import TILE
+from .kernels import HALF, ONE, ZERO, F, compiled, exp2_8
+from .projection import BLUE, GREEN, LOG2_OPACITY, MIN_ALPHA_LOG2, RED, A, B, C, X, Y
 
 PIXELS = TILE * TILE
 LOG2_MAX_ALPHA = F(-0.01449956969)  # log2 0.99

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from viewbench.backends.splat.layout import LOG_SCALE, LOGIT
+from .layout import LOG_SCALE, LOGIT
 
 DEAD = 0.005  # opacity
 MOST = 20  # copies of one Gaussian at a time

@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.backends._seeding import seen
-from viewbench.backends._types import TrainingSet
-from viewbench.backends.splat.layout import LOG_SCALE, LOGIT, MEAN, SH0, SH_C0, empty
-from viewbench.backends.splat.options import Options
-from viewbench.backends.splat.shell import shell
-from viewbench.common.errors import UserError, nearest
+from ...common.errors import UserError, nearest
+from ...scenes.types import Points
+from .._seeding import seen
+from .._surroundings import Surroundings
+from .._types import TrainingSet
+from .layout import LOG_SCALE, LOGIT, MEAN, SH0, SH_C0, empty
+from .options import Options
+from .shell import shell
 
 SOURCES = ("auto", "scene", "selected", "sweep", "rays")
 FEWEST = 500  # scene points, or sure depths, that are worth starting from
@@ -25,7 +27,14 @@ GUESSED_OPACITY, RAY_OPACITY, SHELL_OPACITY = 0.1, 0.03, 0.5
 NEAR, FAR = 0.1, 1.2  # depths along rays where nothing is known, as shares of the cameras' extent
 
 
-def seed(data: TrainingSet, o: Options, rng: np.random.Generator) -> tuple[np.ndarray, dict[str, Any]]:
+def known_points(data: TrainingSet, source: str) -> Points | None:
+    """The scene's points where a start from `source` may know them: a sweep and rays are for scenes without any."""
+    return None if source in ("sweep", "rays") else data.points
+
+
+def seed(
+    data: TrainingSet, o: Options, around: Surroundings, rng: np.random.Generator
+) -> tuple[np.ndarray, dict[str, Any]]:
     """(rows, N) parameters of the Gaussians at the start, and the record of where they come from.
 
     `o.points` is "auto" (scene points, where there are at least 500, and plane sweep), "scene", "selected" (scene
@@ -36,14 +45,14 @@ def seed(data: TrainingSet, o: Options, rng: np.random.Generator) -> tuple[np.nd
         raise UserError(
             f"unknown source of points '{o.points}'{nearest(o.points, SOURCES)} (known: {', '.join(SOURCES)})"
         )
-    extent = camera_extent(data)
+    extent = around.extent
     shell_count = min(o.shell, o.gaussians // 2)
     count = o.gaussians - shell_count
     record: dict[str, Any] = {"asked": o.points, "source": "", "scene_points": 0, "sweep_points": 0}
     record |= {"guessed_points": 0, "ray_points": 0, "shell_points": shell_count}
     starts = _scene_points(data, o, count, rng, record)
     if o.points in ("auto", "sweep"):
-        starts += _swept(data, count - sum(len(start.points) for start in starts), o, extent, rng, record)
+        starts += _swept(data, count - sum(len(start.points) for start in starts), o, around, rng, record)
     known = sum(len(start.points) for start in starts)
     if o.points in ("auto", "sweep", "rays") and known < min(FEWEST, count):
         starts.append(Start(*along_rays(data, count - known, extent, rng), RAY_OPACITY))
@@ -53,7 +62,7 @@ def seed(data: TrainingSet, o: Options, rng: np.random.Generator) -> tuple[np.nd
     points = np.concatenate([start.points for start in starts])
     scales = o.scale * np.maximum(spacing(points), 1e-6 * extent)
     if shell_count:
-        positions, colours, size = shell(data, shell_count, extent)
+        positions, colours, size = shell(data, shell_count, around)
         starts.append(Start(positions, colours, SHELL_OPACITY))
         scales = np.append(scales, np.full(shell_count, size))
     record["count"] = len(scales)
@@ -104,12 +113,12 @@ def _scene_points(
 
 
 def _swept(
-    data: TrainingSet, count: int, o: Options, extent: float, rng: np.random.Generator, record: dict[str, Any]
+    data: TrainingSet, count: int, o: Options, around: Surroundings, rng: np.random.Generator, record: dict[str, Any]
 ) -> list[Start]:
     """Points of the plane sweep, none where it found too little to go by."""
-    from viewbench.backends.splat.depth_maps import depth_maps
+    from .depth_maps import depth_maps
 
-    maps = depth_maps(data, extent, rng)
+    maps = depth_maps(data, around.depths, rng)
     sure, guessed = np.flatnonzero(maps.sure), np.flatnonzero(maps.guessed)
     record |= {"sweep_views": int(maps.sure.any(axis=(1, 2)).sum()), "sweep_depths": len(sure)}
     if len(sure) < FEWEST:
@@ -147,24 +156,6 @@ def along_rays(data: TrainingSet, count: int, extent: float, rng: np.random.Gene
     inside = np.stack([x, -y, -depth], axis=1)
     points = np.einsum("nij,nj->ni", cameras.rotations[view], inside) + cameras.positions[view]
     return points, data.images[view, row, column].astype(np.float64)
-
-
-def camera_extent(data: TrainingSet) -> float:
-    """1.1 × the largest distance of a chosen camera from their middle (3DGS), in scene units.
-
-    Cameras in one place say nothing of the scene's size: then the median distance of its points, or else 1.
-    """
-    positions = data.cameras.positions
-    middle = positions.mean(axis=0)
-    extent = 1.1 * float(np.linalg.norm(positions - middle, axis=1).max())
-    if extent > 1e-6 * float(np.abs(middle).max()):
-        return extent
-    if data.points is not None:
-        distance = np.linalg.norm(data.points.xyz - middle, axis=1)
-        distance = distance[np.isfinite(distance) & (distance > 0)]
-        if len(distance):
-            return float(np.median(distance))
-    return 1.0
 
 
 def spacing(points: np.ndarray) -> np.ndarray:

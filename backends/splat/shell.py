@@ -7,14 +7,15 @@ them. Skies and the world behind windows start there too.
 
 import numpy as np
 
-from viewbench.backends._types import TrainingSet
+from .._surroundings import Surroundings
+from .._types import TrainingSet
 
 RADIUS = 4.0  # of the cameras' extent
 SIZE = 0.7  # of a Gaussian, of the mean distance to its neighbour
 SAMPLES = 16  # rows and columns of pixels taken of each view
 
 
-def shell(data: TrainingSet, count: int, extent: float) -> tuple[np.ndarray, np.ndarray, float]:
+def shell(data: TrainingSet, count: int, around: Surroundings) -> tuple[np.ndarray, np.ndarray, float]:
     """(count, 3) positions, (count, 3) colours in [0, 1], and the Gaussians' standard deviation in scene units."""
     from scipy.spatial import cKDTree
 
@@ -41,8 +42,8 @@ def shell(data: TrainingSet, count: int, extent: float) -> tuple[np.ndarray, np.
         distance, nearest = cKDTree(directions[known]).query(directions[~known], k=[*range(1, k_nearest + 1)])
         weight = 1 / (distance + 1e-3)
         colours[~known] = (colours[known][nearest] * weight[..., None]).sum(1) / weight.sum(1, keepdims=True)
-    radius = RADIUS * extent
-    return cameras.positions.mean(axis=0) + radius * directions, colours, SIZE * radius * np.sqrt(4 * np.pi / count)
+    radius = RADIUS * around.extent
+    return around.centre + radius * directions, colours, SIZE * radius * np.sqrt(4 * np.pi / count)
 
 
 def _even(count: int) -> np.ndarray:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.files import whole
+from ...common.files import whole
 
 FILE = "snapshot.npz"
 

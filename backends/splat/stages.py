@@ -8,12 +8,12 @@ import math
 
 import numpy as np
 
-from viewbench.backends._types import TrainingSet
-from viewbench.backends.splat.engine import Engine
-from viewbench.backends.splat.options import Rendering
-from viewbench.backends.splat.projection import camera_vectors
-from viewbench.backends.splat.shrink import cameras_shrunk, images_shrunk
-from viewbench.scenes.types import Cameras
+from ...scenes.types import Cameras
+from .._types import TrainingSet
+from .engine import Engine
+from .options import Rendering
+from .projection import camera_vectors
+from .shrink import cameras_shrunk, images_shrunk
 
 SMALLEST = 80  # pixels: geometric mean of the sides that halved pictures must have
 

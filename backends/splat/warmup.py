@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from viewbench.backends.splat import layout
-from viewbench.backends.splat.engine import Engine
-from viewbench.backends.splat.options import Rendering
-from viewbench.backends.splat.plane_sweep import sweep
-from viewbench.backends.splat.projection import camera_vectors
-from viewbench.scenes.types import Cameras
+from ...scenes.types import Cameras
+from . import layout
+from .engine import Engine
+from .options import Rendering
+from .plane_sweep import sweep
+from .projection import camera_vectors
 
 
 def compile_kernels() -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError, nearest
-from viewbench.common.files import sha256_file
+from ...common.errors import UserError, nearest
+from ...common.files import sha256_file
 
 DEFAULT = "ViT-SO400M-14-SigLIP-384/webli"
 
@@ -32,7 +32,7 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
     `argument` is MODEL/TAG, where TAG names pretrained weights or is the path of a file with them. Raises UserError
     for an unknown model, a missing tag, and weights that are neither on disk nor in reach of a hub.
     """
-    from viewbench.common.torchvision_cpu import import_torchvision
+    from ...common.torchvision_cpu import import_torchvision
 
     import_torchvision()
     import open_clip

@@ -6,7 +6,7 @@ The layouts are those of COLMAP's scene/reconstruction_io.cc: little-endian, a u
 import struct
 from pathlib import Path
 
-from viewbench.common.errors import UserError
+from ...common.errors import UserError
 
 PARAMETERS = (3, 4, 4, 5, 8, 8, 12, 5, 4, 5, 12, 16, 4, 5, 3, 4, 6, 2)  # by camera model, SIMPLE_PINHOLE first
 POSE = 7 * 8  # a quaternion and a translation

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.scenes.image_files import image_size
-from viewbench.scenes.types import OPENCV, Cameras, Split
+from ...common.errors import UserError
+from ..image_files import image_size
+from ..types import OPENCV, Cameras, Split
 
 
 def numbers(path: Path, what: str) -> np.ndarray:

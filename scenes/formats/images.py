@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.scenes.formats._frames import natural
-from viewbench.scenes.image_files import image_size
-from viewbench.scenes.subset import place_image
-from viewbench.scenes.types import Cameras, Scene, Split
+from ...common.errors import UserError
+from ..image_files import image_size
+from ..subset import place_image
+from ..types import Cameras, Scene, Split
+from ._frames import natural
 
 WRITABLE = True
 POSED = False

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json
-from viewbench.scenes.formats._frames import by_number, matrix, numbers, split
-from viewbench.scenes.types import Scene
+from ...common.errors import UserError
+from ...common.files import read_json
+from ..types import Scene
+from ._frames import by_number, matrix, numbers, split
 
 WRITABLE = False
 CAMERA = "cam_params.json"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.scenes.formats._frames import by_number, matrix, split
-from viewbench.scenes.types import Scene
+from ...common.errors import UserError
+from ..types import Scene
+from ._frames import by_number, matrix, split
 
 WRITABLE = False
 

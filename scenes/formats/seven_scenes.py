@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.scenes.formats._frames import matrix, split
-from viewbench.scenes.types import Scene, Split
+from ...common.errors import UserError
+from ..types import Scene, Split
+from ._frames import matrix, split
 
 WRITABLE = False
 FOCAL, CENTRE = 585.0, (320.0, 240.0)  # pixels, of the 640 x 480 pictures, as the data set says

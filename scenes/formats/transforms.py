@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json, write_json
-from viewbench.scenes.image_files import image_size, is_file, leaves, stored_name
-from viewbench.scenes.subset import place_image
-from viewbench.scenes.types import Cameras, Points, Scene, Split
+from ...common.errors import UserError
+from ...common.files import read_json, write_json
+from ..image_files import image_size, is_file, leaves, stored_name
+from ..subset import place_image
+from ..types import Cameras, Points, Scene, Split
 
 WRITABLE = True
 SINGLE, TRAIN, TESTS = "transforms.json", "transforms_train.json", ("transforms_test.json", "transforms_val.json")
@@ -175,7 +175,7 @@ def _intrinsics(table: dict, name: str, path: Path, file: Path, sizes: dict[Path
 
 
 def _points(root: Path, table: dict) -> tuple[Points | None, Path | None]:
-    from viewbench.scenes.ply import read_points
+    from ..ply import read_points
 
     named = table.get("ply_file_path")
     candidates = ["points3d.ply", "points3D.ply", "sparse_pc.ply"]
@@ -194,7 +194,7 @@ def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
     format becomes transforms_train and transforms_test, or a single file where it has no test split. In a single file
     the test split, if any, stands in nerfstudio's lists of file names. Points are written as points3d.ply.
     """
-    from viewbench.scenes.ply import write_points
+    from ..ply import write_points
 
     details = scene.details if scene.format == "transforms" else {}
     own, names = details.get("tables", {}), {"train": TRAIN, "test": TESTS[0], **details.get("names", {})}

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.scenes.formats._frames import numbers, split
-from viewbench.scenes.types import Scene
+from ...common.errors import UserError
+from ..types import Scene
+from ._frames import numbers, split
 
 WRITABLE = False
 FARTHEST_S = 0.02  # between a frame and its pose, as the data set's own tools

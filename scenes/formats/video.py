@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from viewbench.common.errors import UserError
-from viewbench.common.files import read_json, sha256_file, whole_folder, write_json
-from viewbench.scenes.formats.images import nominal_cameras, unposed
-from viewbench.scenes.types import Scene, Split
+from ...common.errors import UserError
+from ...common.files import read_json, sha256_file, whole_folder, write_json
+from ..types import Scene, Split
+from .images import nominal_cameras, unposed
 
 WRITABLE = True
 POSED = False
@@ -41,7 +41,7 @@ def read(root: Path) -> Scene:
     paths = tuple(folder / f"{name}.jpg" for name in names)
     sizes = np.tile(np.array(table["size"], dtype=np.int64), (len(times), 1))
     frames = Split(names, paths, nominal_cameras(sizes), np.array(times, dtype=np.float64))
-    return unposed(root, "video", frames, files=(root,))
+    return unposed(root, "video", frames, files=(root,), extracted=True)
 
 
 def frame_name(number: int) -> str:

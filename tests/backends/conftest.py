@@ -69,7 +69,9 @@ def take_views() -> Callable[..., TrainingSet]:
         tracks = tuple(rng.choice(400, 5, replace=False) for _ in xyz) if seen_by else None
         points = Points(xyz, rgb, tracks)
         names = tuple(frame["file_path"] for frame in frames)
-        return TrainingSet("room", names, cameras, np.stack(images), points, np.array(chosen, dtype=np.int64))
+        everyone = cameras_of(np.array([frame["transform_matrix"] for frame in transforms["frames"]]), width, height)
+        chosen_array = np.array(chosen, dtype=np.int64)
+        return TrainingSet("room", names, cameras, np.stack(images), points, chosen_array, everyone)
 
     def cameras_of(c2w: np.ndarray, width: int, height: int) -> Cameras:
         focal = width / (2 * np.tan(transforms["camera_angle_x"] / 2))

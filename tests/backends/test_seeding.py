@@ -22,14 +22,16 @@ def test_selected_points_are_those_that_two_chosen_views_see(take_views):
     assert record == {"points": "selected", "count": sum(kept), "of": 200}
 
 
-def test_random_points_lie_around_the_chosen_cameras_and_are_repeated_by_their_seed(take_views):
+def test_random_points_lie_around_all_training_cameras_whichever_were_chosen(take_views):
     views = take_views()
     draws = [seed_points(views, "random", np.random.default_rng(4), 500)[0] for _ in range(2)]
     assert np.array_equal(*draws)
-    low, high = views.cameras.positions.min(axis=0), views.cameras.positions.max(axis=0)
+    low, high = views.training.positions.min(axis=0), views.training.positions.max(axis=0)
     margin = 0.5 * (high - low).max()
     assert np.all((draws[0] >= low - margin) & (draws[0] <= high + margin))
-    assert np.ptp(seed_points(take_views((5,)), "random", RNG, 50)[0], axis=0).min() > 0, "one view has a box too"
+    assert np.array_equal(draws[0], seed_points(take_views((5, 7)), "random", np.random.default_rng(4), 500)[0])
+    alone = replace(views, training=views.training[:1])
+    assert np.ptp(seed_points(alone, "random", RNG, 50)[0], axis=0).min() > 0, "one camera has a box too"
 
 
 def test_points_that_are_not_there_are_explained(take_views):

@@ -62,7 +62,7 @@ def views(name: str, width: int, share: float, holdout: str | None) -> tuple[Tra
     chosen = np.unique(np.linspace(0, count - 1, max(2, round(share * count))).round().astype(np.int64))
     images, cameras = load_images(scene.train, chosen, width)
     names = tuple(scene.train.names[i] for i in chosen)
-    data = TrainingSet(name, names, cameras, images, scene.points, chosen)
+    data = TrainingSet(name, names, cameras, images, scene.points, chosen, scene.train.cameras.scaled(width))
     return data, *load_images(scene.test, np.arange(len(scene.test)), width)
 
 

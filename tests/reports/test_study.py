@@ -18,7 +18,7 @@ def test_grid_and_failures(folder):
     assert len(study.cells) == 4 * 3 * 3 + 3 + 1
     assert [(cell.selector, cell.ratio, cell.seed) for cell in study.failed] == [("logdet", 0.1, 1)]
     assert len(study.find(selector="logdet", ratio=0.1)) == 2
-    assert study.middle_ratio == 0.1
+    assert study.middle_ratio() == study.middle_ratio("splat") == 0.1
     assert study.full("splat", "room_human").count == 400
     assert study.panels() == [("splat", "room_human")]
     assert study.find(selector="maxmin", seed=2)[0].read("selection")["selector"] == "maxmin"

@@ -59,11 +59,22 @@ def test_frames_come_in_natural_order_with_poses_and_tracks(model):
     assert by_place == {(0, 1, 5): [0, 1, 2], (1, 1, 5): [2, 3], (2, 1, 5): [0, 1]}
 
 
-def test_holding_out_renumbers_the_tracks(model):
-    scene = opened(model, holdout="every:2")
-    assert scene.train.names == ("frame3.png", "sub/frame1.png")
+def test_holding_out_renumbers_the_tracks_and_drops_what_test_views_alone_tell(model):
+    scene = opened(model, holdout="every:4")
+    assert scene.train.names == ("frame3.png", "frame10.png", "sub/frame1.png")
     by_place = {tuple(xyz): seen.tolist() for xyz, seen in zip(scene.points.xyz, scene.points.seen_by, strict=True)}
-    assert by_place == {(0, 1, 5): [0], (1, 1, 5): [1], (2, 1, 5): [0]}
+    # the third point was seen by frame 2, which is held out, and by frame 3
+    assert by_place == {(0, 1, 5): [0, 1], (1, 1, 5): [1, 2]}
+    assert scene.notes == ("1 of 3 points left out: fewer than 2 training views see them",)
+    assert opened(model, holdout="every:2").points is None
+
+
+def test_the_list_beside_the_model_drops_them_too(model):
+    (model / "sparse" / "0" / "test.txt").write_text("frame2.png\n")
+    listed, held = opened(model), opened(model, holdout="none")
+    assert listed.test.names == held.test.names == ("frame2.png",)
+    assert sorted(listed.points.xyz[:, 0]) == [0, 1]
+    assert listed.notes == ("1 of 3 points left out: fewer than 2 training views see them",)
 
 
 def test_pycolmap_opens_the_subset(model, tmp_path):
@@ -72,10 +83,13 @@ def test_pycolmap_opens_the_subset(model, tmp_path):
     read = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
     assert read.is_valid()
     assert sorted(image.name for image in read.images.values()) == ["frame2.png", "frame3.png"]
-    # the second point was seen by none of the two
-    assert sorted(point.xyz[0] for point in read.points3D.values()) == [0, 2]
-    for point in read.points3D.values():
-        assert {read.images[e.image_id].name for e in point.track.elements} == {"frame2.png", "frame3.png"}
+    # all points that the capture's training views triangulated stay; the second was seen by none of the two chosen
+    tracks = {point.xyz[0]: [e.image_id for e in point.track.elements] for point in read.points3D.values()}
+    assert {place: sorted(read.images[i].name for i in track) for place, track in tracks.items()} == {
+        0: ["frame2.png", "frame3.png"],
+        1: [],
+        2: ["frame2.png", "frame3.png"],
+    }
     again = opened(tmp_path / "out")
     assert again.train.names == ("frame2.png", "frame3.png")
     np.testing.assert_allclose(again.train.cameras.c2w, scene.train.cameras.c2w[:2], atol=1e-12)
@@ -87,11 +101,18 @@ def test_the_test_split_stays_the_test_split(model, tmp_path):
     write_subset(scene, {"indices": [0]}, tmp_path / "out")
     again = opened(tmp_path / "out")
     assert (again.train.names, again.test.names) == (("frame3.png",), scene.test.names)
+    np.testing.assert_allclose(again.test.cameras.c2w, scene.test.cameras.c2w, atol=1e-12)
+    assert all(path.is_file() for path in again.test.paths)
+    write_subset(again, {"indices": [0]}, tmp_path / "once more")
+    third = opened(tmp_path / "once more")
+    assert (third.train.names, third.test.names) == (again.train.names, again.test.names)
 
 
-def test_mip_nerf_360_tests_on_every_eighth(model):
+def test_mip_nerf_360_tests_on_every_eighth_and_says_so(model):
     (model / "poses_bounds.npy").write_bytes(b"")
-    assert opened(model).test.names == ("frame2.png",)
+    scene = opened(model)
+    assert scene.test.names == ("frame2.png",)
+    assert any("poses_bounds.npy is here" in note and "--holdout" in note for note in scene.notes)
     assert len(opened(model, holdout="none").test) == 0
 
 
@@ -151,5 +172,5 @@ def test_subsets_of_real_captures_open_again(data_root, tmp_path, name):
     if scene.format == "colmap":
         model = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
         assert model.is_valid()
-        assert model.num_images() == 3 + len(scene.test)
+        assert sorted(image.name for image in model.images.values()) == sorted(scene.train.names[i] for i in chosen)
         assert model.num_points3D() > 100

@@ -30,7 +30,7 @@ def random_views(rng, n=40, dims=12, intrinsics=True):
 
 
 def matrix(views, alpha=0.7, beta=0.2, sigma=0.5, factors=("pos", "ang", "sem")):
-    """M of Eq. 2 entry by entry, with the weights of the factors in use divided by their sum."""
+    """M of the “Distance Measures” entry by entry, with the weights of the factors in use divided by their sum."""
     weights = {"pos": alpha, "ang": beta, "sem": 1 - alpha - beta}
     if views.features is None:
         factors = [name for name in factors if name != "sem"]
@@ -62,7 +62,7 @@ def greedy(gain, n, count, start=None):
 
 
 def maxmin(m, count, start):
-    """Definition 2; the first gain, a minimum over nothing, is 1."""
+    """Max-Min Distance Function; the first gain, a minimum over nothing, is 1."""
     return greedy(lambda s, k: min((1 - m[i, k] for i in s), default=1.0), len(m), count, start)
 
 
@@ -82,7 +82,7 @@ def farthest(distance, count, start):
 
 
 def coverage(views, count, lam=0.05, spacing=0.5, polar=5, azimuth=10):
-    """Definition 3: Eq. 5 summed anew over all regions and bins for every candidate."""
+    """Uniform Coverage Function: its gain summed anew over all regions and bins for every candidate."""
     nodes = _grid(views.positions, spacing)
     edges = np.cos(np.linspace(0, np.pi, polar + 1))
     weight = np.repeat(1 / ((edges[:-1] - edges[1:]) * 2 * np.pi / azimuth), azimuth)

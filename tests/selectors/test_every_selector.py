@@ -1,6 +1,7 @@
 """What holds for every selector: run on one scene through the door that the command line uses."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +14,12 @@ from viewbench.common.errors import UserError
 from viewbench.common.files import plain
 from viewbench.scenes.types import Cameras, Scene, Split
 from viewbench.selectors import _run
+from viewbench.selectors._selection import check_selection, count_of, first_views, selection_sha256
 
 NAMES = plugins.names("selectors")
 GREEDY = ["maxmin", "logdet", "facility", "kcenter", "coverage", "random"]
 N = 30
+PICTURE = Path(__file__)  # selectors see no picture; the scene's hash reads one
 
 
 def scene_of(views, shift=0.0, scale=1.0):
@@ -26,8 +29,8 @@ def scene_of(views, shift=0.0, scale=1.0):
     fx, fy, cx, cy, width, height = views.intrinsics.T
     cameras = Cameras(c2w, fx, fy, cx, cy, width.astype(int), height.astype(int))
     names = tuple(f"frame {i:03d}" for i in range(n))
-    split = Split(names, tuple(names), cameras)
-    return Scene("a scene", None, "test", split, split.subset([]))
+    split = Split(names, (PICTURE,) * n, cameras)
+    return Scene("a scene", PICTURE.parent, "transforms", split, split.subset([]))
 
 
 VIEWS = slow.random_views(np.random.default_rng(11), n=N)
@@ -43,10 +46,8 @@ def run(selector, count=10, seed=0, scene=SCENE, features=VIEWS.features, **othe
 @pytest.mark.parametrize("count", [1, 7, N])
 def test_a_selection_is_distinct_views_with_all_its_fields(selector, count):
     record = run(selector, count)
-    assert list(record)[:11] == [
-        *("schema", "scene", "selector", "parameters", "seed", "n_views", "count", "indices", "names", "gains"),
-        "seconds",
-    ]
+    fields = "schema scene scene_sha256 holdout selector parameters seed n_views count indices names gains seconds"
+    assert list(record)[:13] == fields.split()
     assert record["n_views"] == N
     assert record["count"] == len(record["indices"]) == len(set(record["indices"]))
     assert set(record["indices"]) <= set(range(N))
@@ -126,13 +127,81 @@ def test_of_equal_views_the_sharper_is_taken(selector):
 @settings(max_examples=300, deadline=None)
 @given(ratio=st.floats(1e-9, 1.0), n=st.integers(1, 100_000))
 def test_count_of_a_ratio(ratio, n):
-    count = _run.count_of(ratio, n)
+    count = count_of(ratio, n)
     assert 1 <= count <= n
     assert abs(count - ratio * n) <= 0.5 or count == 1
 
 
+@settings(max_examples=300, deadline=None)
+@given(percent=st.integers(1, 100), n=st.integers(1, 100_000))
+def test_the_authors_count_is_the_whole_part(percent, n):
+    assert count_of(percent / 100, n, "floor") == max(1, percent * n // 100)
+
+
+def test_an_unknown_rule_of_counting_is_answered():
+    with pytest.raises(UserError, match="did you mean 'floor'"):
+        count_of(0.1, 10, "flor")
+
+
+@pytest.mark.parametrize("selector", NAMES)
+def test_a_selector_that_says_so_is_greedy_and_no_other(selector):
+    greedy = plugins.constant("selectors", selector, "GREEDY", False)
+    assert greedy == (selector in (*GREEDY, "full"))
+    assert run(selector)["greedy"] == greedy
+
+
+@pytest.mark.parametrize("selector", GREEDY)
+def test_the_first_views_of_an_order_are_the_choice_of_so_many(selector):
+    cut, own = first_views(run(selector, N), 7), run(selector, 7)
+    for key in set(own) - {"seconds"}:
+        assert cut[key] == own[key], key
+    assert (cut["cut_from"], own.get("cut_from")) == (N, None)
+    assert selection_sha256(cut) == selection_sha256(own)
+    with pytest.raises(UserError, match="has 7 views"):
+        first_views(cut, 8)
+
+
+@pytest.mark.parametrize("parameters", [{}, {"sample": True}])
+def test_a_choice_without_an_order_is_not_cut(parameters):
+    selector = "logdet" if parameters else "uniform"
+    with pytest.raises(UserError, match="are not its choice of 3; select 3"):
+        first_views(run(selector, 10, parameters=parameters), 3)
+
+
+def test_the_notes_of_an_order_go_with_the_views_that_they_are_about():
+    twins = type(VIEWS)(*(np.repeat(part[:6], 5, axis=0) for part in list(vars(VIEWS).values())[:4]))
+    order = run("logdet", N, scene=scene_of(twins), features=twins.features)
+    at = order["notes"]["below_precision_from"]
+    assert at == 6
+    assert "notes" not in first_views(order, at)
+    assert first_views(order, at + 1)["notes"]["below_precision_from"] == at
+
+
+def test_the_hash_of_a_choice_is_of_the_choice_alone():
+    record = run("maxmin")
+    same = {
+        **record,
+        "seconds": {"similarity": 9.0, "select": 9.0},
+        "gains": None,
+        "viewbench": "9",
+        "code_sha256": "x",
+    }
+    assert selection_sha256(same) == selection_sha256(record)
+    for key in ("scene_sha256", "holdout", "indices", "seed", "parameters"):
+        assert selection_sha256({**record, key: None}) != selection_sha256(record)
+
+
+def test_a_selection_of_another_version_of_the_scene_is_refused():
+    record = run("maxmin")
+    assert check_selection(record, SCENE, record["scene_sha256"]).tolist() == record["indices"]
+    with pytest.raises(UserError, match=r"with holdout 'given' and hash .*; select again"):
+        check_selection(record, SCENE, "0" * 64)
+    by_hand = {key: record[key] for key in ("selector", "seed", "n_views", "indices", "names")}
+    assert check_selection(by_hand, SCENE, "0" * 64).tolist() == record["indices"]
+
+
 def test_halves_go_to_the_even_number():
-    assert [_run.count_of(0.5, n) for n in (1, 3, 5, 7)] == [1, 2, 2, 4]
+    assert [count_of(0.5, n) for n in (1, 3, 5, 7)] == [1, 2, 2, 4]
 
 
 BAD_FEATURES = {
@@ -181,7 +250,7 @@ def test_mistakes_are_answered_in_one_sentence(given_, message):
 @pytest.mark.parametrize("ratio", [0.0, -0.1, 1.0001, float("nan"), float("inf")])
 def test_a_ratio_outside_its_range(ratio):
     with pytest.raises(UserError, match="must lie in"):
-        _run.count_of(ratio, 10)
+        count_of(ratio, 10)
 
 
 def test_full_is_not_a_choice():

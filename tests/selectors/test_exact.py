@@ -135,10 +135,30 @@ def test_coverage(seed):
 
 @settings(max_examples=200, deadline=None)
 @given(seed=seeds, n=st.integers(1, 300), data=st.data())
-def test_uniform_is_linspace_from_a_random_start(seed, n, data):
+def test_uniform_takes_equal_steps_round_the_capture(seed, n, data):
     count = data.draw(st.integers(1, n))
     views = slow.random_views(np.random.default_rng(0), n=n, dims=0)
     chosen = uniform.select(views, count, np.random.default_rng(seed)).indices
+    assert len(set(chosen.tolist())) == count
+    steps = np.diff([*chosen, chosen[0] + n]) % n if count > 1 else np.array([n])
+    assert set(steps.tolist()) <= {n // count, -(-n // count)}, "the step over the end is one like the others"
+
+
+@settings(max_examples=200, deadline=None)
+@given(seed=seeds, n=st.integers(2, 300), data=st.data())
+def test_uniform_of_the_authors_is_linspace_whose_ends_meet(seed, n, data):
+    count = data.draw(st.integers(2, n))
+    views = slow.random_views(np.random.default_rng(0), n=n, dims=0)
+    chosen = uniform.select(views, count, np.random.default_rng(seed), steps="linspace").indices
     steps = (chosen - chosen[0]) % n
     assert len(set(chosen.tolist())) == count
     assert (np.abs(steps - np.linspace(0, n - 1, count)) < 1).all()
+    assert (chosen[-1] + 1) % n == chosen[0], "two of its views are neighbours, which is why it is not the default"
+
+
+@pytest.mark.parametrize("steps", ["equal", "linspace"])
+@pytest.mark.parametrize("seed", range(4))
+def test_both_forms_of_uniform_start_at_the_same_view(steps, seed):
+    views = slow.random_views(np.random.default_rng(0), n=50, dims=0)
+    start = int(np.random.default_rng(seed).integers(50))
+    assert uniform.select(views, 7, np.random.default_rng(seed), steps=steps).indices[0] == start

@@ -1,15 +1,12 @@
 """A study through Snakemake in a copy of the package that the test may edit: what runs, and what runs again."""
 
+import csv
 import json
-import os
-import re
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
-from tests.conftest import copy_package, environment_of
+from tests.conftest import ROOM
+from tests.workflow.clones import Clone, take_frames
 
 STUDY = """
 title: A study of two cells
@@ -26,43 +23,9 @@ reports: [psnr_over_ratio, table_psnr]
 """
 
 
-class Clone:
-    """A copy of viewbench in which a study is run."""
-
-    def __init__(self, parent: Path):
-        self.folder = copy_package(parent)
-        self.cells = self.folder / "results" / "mini" / "cells" / "splat" / "room_human"
-        (self.folder / "workflow" / "studies" / "mini.yaml").write_text(STUDY, encoding="utf-8")
-        self.environment = environment_of(self.folder)
-
-    def snakemake(self, *arguments: str, study: str = "mini", **variables: str) -> subprocess.CompletedProcess:
-        command = [sys.executable, "-m", "snakemake", "-j2", *arguments, "--config", f"study={study}", "--", "reports"]
-        return subprocess.run(
-            command, cwd=self.folder, env={**self.environment, **variables}, capture_output=True, text=True, timeout=300
-        )
-
-    def run(self, **variables: str) -> str:
-        done = self.snakemake(**variables)
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout + done.stderr
-
-    def planned(self) -> dict[str, int]:
-        """Jobs by rule that a run would do now."""
-        done = self.snakemake("-n")
-        assert done.returncode == 0, done.stdout + done.stderr
-        table = done.stdout + done.stderr
-        jobs = {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)}
-        jobs.pop("total", None)
-        return jobs
-
-    def edit(self, name: str) -> None:
-        path = self.folder / name
-        path.write_text(path.read_text(encoding="utf-8") + "\n# edited\n", encoding="utf-8")
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    clone = Clone(tmp_path_factory.mktemp("finished"))
+    clone = Clone(tmp_path_factory.mktemp("finished"), STUDY)
     assert clone.planned()["evaluate"] == 2
     shown = clone.run()
     assert "2 of 2 cells" in shown
@@ -71,59 +34,38 @@ def finished(tmp_path_factory):
 
 @pytest.fixture
 def clone(finished, tmp_path):
-    """The finished study in a copy of its own; times of files are kept, so that nothing looks changed."""
-    other = Clone.__new__(Clone)
-    other.folder = tmp_path / "viewbench"
-    subprocess.run(["cp", "-a", str(finished.folder), str(other.folder)], check=True)
-    other.cells = other.folder / finished.cells.relative_to(finished.folder)
-    other.environment = environment_of(other.folder)
+    other = finished.copied(tmp_path)
     assert other.planned() == {}
     return other
+
+
+def cell(clone, selector="maxmin"):
+    return clone.results / "cells" / "splat" / "room_human" / selector / "0.02" / "0"
+
+
+def rows(clone):
+    """results.csv by selector."""
+    with open(clone.results / "results.csv", newline="", encoding="utf-8") as file:
+        return {row["selector"]: row for row in csv.DictReader(file)}
 
 
 AFTER = {"collect": 1, "track": 1, "report": 2, "page": 1, "reports": 1}
 
 
 def test_a_finished_study_is_not_run_again(clone):
-    before = {path: path.stat().st_mtime_ns for path in clone.cells.rglob("*.json")}
+    before = {path: path.stat().st_mtime_ns for path in clone.results.rglob("cells/**/*.json")}
     clone.run()
-    assert {path: path.stat().st_mtime_ns for path in clone.cells.rglob("*.json")} == before
-
-
-def test_editing_a_selector_reruns_its_cells_only(clone):
-    clone.edit("selectors/maxmin.py")
-    assert clone.planned() == {"select": 1, "train": 1, "evaluate": 1, **AFTER}
-
-
-def test_editing_a_report_reruns_that_report_only(clone):
-    clone.edit("reports/psnr_over_ratio.py")
-    assert clone.planned() == {"report": 1, "page": 1, "reports": 1}
-
-
-def test_editing_the_trainer_keeps_the_selections(clone):
-    clone.edit("backends/splat/__init__.py")
-    planned = clone.planned()
-    assert "select" not in planned
-    assert planned["train"] == 2
-
-
-def test_editing_the_scoring_keeps_the_models(clone):
-    clone.edit("backends/_metrics.py")
-    planned = clone.planned()
-    assert planned["evaluate"] == 2
-    assert "select" not in planned
+    assert {path: path.stat().st_mtime_ns for path in clone.results.rglob("cells/**/*.json")} == before
 
 
 def test_a_deleted_score_is_the_only_thing_redone(clone):
-    (clone.cells / "maxmin" / "0.02" / "0" / "metrics.json").unlink()
-    kept = (clone.cells / "uniform" / "0.02" / "0" / "metrics.json").stat().st_mtime_ns
+    (cell(clone) / "metrics.json").unlink()
+    kept = (cell(clone, "uniform") / "metrics.json").stat().st_mtime_ns
     assert clone.planned() == {"evaluate": 1, **AFTER}
     clone.run()
-    assert (clone.cells / "uniform" / "0.02" / "0" / "metrics.json").stat().st_mtime_ns == kept
-    code = "from tests.end_to_end import check; from pathlib import Path; print(check(Path('results/mini')))"
-    root = Path(__file__).parents[2]
-    environment = {**clone.environment, "PYTHONPATH": os.pathsep.join([str(clone.folder.parent), str(root)])}
-    subprocess.run([sys.executable, "-c", code], cwd=clone.folder, env=environment, check=True)
+    assert (cell(clone, "uniform") / "metrics.json").stat().st_mtime_ns == kept
+    done = clone.call("tests.end_to_end", "results/mini")
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_failed_cell_is_named_and_the_rest_reported(clone):
@@ -133,35 +75,152 @@ def test_a_failed_cell_is_named_and_the_rest_reported(clone):
     done = clone.snakemake()
     assert done.returncode != 0
     assert "no luck" in done.stderr
-    rows = (clone.folder / "results" / "mini" / "results.csv").read_text(encoding="utf-8").splitlines()
-    statuses = [row.rsplit(",", 1)[1] for row in rows[1:]]
-    assert statuses.count("ok") == 1
-    assert len(statuses) == 2
+    assert {name: row["status"] for name, row in rows(clone).items()} == {
+        "uniform": "ok",
+        "maxmin": "select: ValueError: no luck",
+    }
     broken.write_text(text, encoding="utf-8")
     clone.run()
     assert clone.planned() == {}
 
 
+def test_what_a_failure_left_behind_is_never_ok(clone):
+    """The trainer changed and its kernels do not compile: both cells have all their files, and none counts."""
+    clone.edit("backends/splat/raster.py", "def render(", "def renderer(")
+    assert clone.snakemake().returncode != 0
+    assert (cell(clone) / "metrics.json").is_file()
+    for row in rows(clone).values():
+        assert (row["psnr_db"], "is by other code" in row["status"]) == ("", True), row["status"]
+
+
+def test_a_file_of_another_cell_is_found(clone):
+    for name, words in {"train.json": "of another selection", "selection.json": "by another selector"}.items():
+        other = clone.copied(clone.folder.parent / name)
+        (cell(other) / name).write_bytes((cell(other, "uniform") / name).read_bytes())
+        done = other.call("viewbench", "collect", "mini")
+        assert (done.returncode, words in done.stderr) == (2, True), done.stderr
+
+
+def test_a_model_that_was_altered_is_not_scored(clone):
+    for name, change in {
+        "model.ply": lambda data: data[:-4] + b"\0\0\0\0",
+        "splat.json": lambda data: data + b" ",
+    }.items():
+        path = cell(clone) / name
+        before = path.read_bytes()
+        path.write_bytes(change(before))
+        done = clone.call("viewbench", "evaluate", str(cell(clone)), "room_human", "--out", str(cell(clone)))
+        assert done.returncode == 2
+        assert f"{name}' is missing or not as training left it; train again" in done.stderr
+        path.write_bytes(before)
+
+
+def test_another_test_split_is_refused_by_every_step(tmp_path):
+    """A model is never scored on views that it was trained on."""
+    walk = take_frames(ROOM, tmp_path / "walk", 12)
+    clone = Clone(tmp_path / "clone", STUDY)
+    step = {"holdout": "every:4", "select": tmp_path / "s.json", "model": tmp_path / "model"}
+
+    def select(holdout):
+        options = ["--selector", "uniform", "--count", "3", "--holdout", holdout, "--selection", str(step["select"])]
+        return clone.call("viewbench", "select", str(walk), *options)
+
+    def train(holdout):
+        options = ["--selection", str(step["select"]), "--iterations", "2", "--width", "48", "--holdout", holdout]
+        return clone.call("viewbench", "train", str(walk), *options, "--out", str(step["model"]))
+
+    def evaluate(holdout):
+        out = str(step["model"])
+        return clone.call("viewbench", "evaluate", out, str(walk), "--out", out, "--holdout", holdout)
+
+    assert select("every:4").returncode == 0
+    refused = train("every:3")
+    assert refused.returncode == 2
+    assert "holdout 'every:4'" in refused.stderr
+    assert len(refused.stderr.splitlines()) == 1
+    assert train("every:4").returncode == 0
+    refused = evaluate("every:3")
+    assert refused.returncode == 2
+    assert "was trained on scene 'walk' with holdout 'every:4'" in refused.stderr
+    assert evaluate("every:4").returncode == 0
+
+
+def test_a_study_whose_test_split_changes_is_made_anew(tmp_path):
+    walk = take_frames(ROOM, tmp_path / "walk", 12)
+    clone = Clone(tmp_path / "clone", STUDY.replace("room_human", "walk").replace("0.02", "0.3"))
+    settings = f"[scenes.walk]\npath = {str(walk)!r}\nholdout = 'every:4'\n"
+    (clone.folder / "environment.toml").write_text(settings, encoding="utf-8")
+    clone.run()
+    before = {path: json.loads(path.read_text()) for path in clone.results.rglob("cells/**/*.json")}
+    clone.edit("environment.toml", "every:4", "every:3")
+    clone.run()
+    for path, old in before.items():
+        new = json.loads(path.read_text())
+        if path.name != "splat.json":
+            assert (old["holdout"], new["holdout"]) == ("every:4", "every:3")
+            assert old["scene_sha256"] != new["scene_sha256"]
+        if path.name == "metrics.json":
+            assert (len(old["views"]), len(new["views"])) == (3, 4)
+    assert clone.planned() == {}
+
+
+def test_two_clones_in_different_folders_have_the_same_numbers(finished, tmp_path):
+    other = Clone(tmp_path / "somewhere" / "else", STUDY)
+    other.run()
+    for selector, row in rows(finished).items():
+        same = rows(other)[selector]
+        for column in set(row) - {"select_s", "train_s", "evaluate_s", "peak_rss_bytes"}:
+            assert row[column] == same[column], column
+        for file in ("model.ply", "splat.json"):
+            assert (cell(finished, selector) / file).read_bytes() == (cell(other, selector) / file).read_bytes()
+
+
+def test_a_second_run_in_the_same_folder_is_told_why_it_cannot(clone):
+    (cell(clone) / "metrics.json").unlink()
+    locks = clone.folder / ".snakemake" / "locks"
+    locks.mkdir(parents=True, exist_ok=True)
+    wanted = (cell(clone) / "metrics.json").relative_to(clone.folder)
+    (locks / "0.output.lock").write_text(f"{wanted}\n", encoding="utf-8")
+    done = clone.snakemake()
+    assert done.returncode != 0
+    assert "LockException" in done.stderr
+    assert "cannot be locked" in done.stderr
+    (locks / "0.output.lock").unlink()
+    clone.run()
+
+
+def test_an_error_of_snakemake_itself_is_said(clone):
+    (clone.results / "study.json").unlink()
+    clone.edit("workflow/rules/scenes.smk", "input:\n        WIRING.study_file,", 'input:\n        "nowhere.txt",')
+    done = clone.snakemake()
+    assert done.returncode != 0
+    assert "MissingInputException" in done.stderr
+    assert "nowhere.txt" in done.stderr
+
+
 def test_a_tracking_server_that_is_down_does_not_stop_the_study(clone):
-    (clone.cells / "maxmin" / "0.02" / "0" / "metrics.json").unlink()
+    (cell(clone) / "metrics.json").unlink()
     done = clone.snakemake(VIEWBENCH_TRACKING_URI="http://127.0.0.1:9", MLFLOW_HTTP_REQUEST_MAX_RETRIES="0")
     assert done.returncode == 0, done.stderr
-    assert (clone.cells / "maxmin" / "0.02" / "0" / "metrics.json").is_file()
+    assert (cell(clone) / "metrics.json").is_file()
 
 
 def test_without_a_target_everything_is_made(clone):
-    (clone.cells / "maxmin" / "0.02" / "0" / "metrics.json").unlink()
-    command = [sys.executable, "-m", "snakemake", "-n", "--config", "study=mini"]
-    done = subprocess.run(command, cwd=clone.folder, env=clone.environment, capture_output=True, text=True)
+    (cell(clone) / "metrics.json").unlink()
+    done = clone.call("snakemake", "-n", "--config", "study=mini")
     assert "evaluate room_human: maxmin" in done.stdout + done.stderr
 
 
 def test_a_study_can_be_recorded(clone, tmp_path):
-    command = [sys.executable, "-m", "viewbench", "record", "results/mini", "--into", str(tmp_path / "kept")]
-    subprocess.run([*command, "--note", "by a test"], cwd=clone.folder, env=clone.environment, check=True)
-    kept = tmp_path / "kept" / "mini"
-    assert sorted(path.name for path in kept.iterdir()) == ["about.json", "psnr_over_ratio.png", "results.csv"]
-    about = json.loads((kept / "about.json").read_text(encoding="utf-8"))
+    kept = tmp_path / "kept"
+    done = clone.call("viewbench", "record", "results/mini", "--into", str(kept), "--note", "by a test")
+    assert done.returncode == 0, done.stderr
+    assert sorted(path.name for path in (kept / "mini").iterdir()) == [
+        "about.json",
+        "psnr_over_ratio.png",
+        "results.csv",
+    ]
+    about = json.loads((kept / "mini" / "about.json").read_text(encoding="utf-8"))
     assert about["notes"] == "by a test"
     assert about["machine"]["cpus"] >= 1
     assert about["versions"]["numba"]

@@ -1,15 +1,15 @@
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from viewbench.common import plugins
+from viewbench.common import plugins, sources
 from viewbench.common.settings import PACKAGE
-from viewbench.workflow import _sources
 
 
 def files(*modules):
-    return {str(path).removeprefix(str(PACKAGE) + "/") for path in _sources.sources(*modules)}
+    return set(sources.sources(*modules))
 
 
 @pytest.mark.parametrize("selector", plugins.names("selectors"))
@@ -24,7 +24,38 @@ def test_training_does_not_depend_on_selectors_or_reports():
     found = files("workflow.commands.train", "backends.splat")
     assert "backends/splat/__init__.py" in found
     assert "backends/_train.py" in found
-    assert not any(name.startswith(("reports/", "selectors/")) for name in found)
+    assert not any(name.startswith("reports/") for name in found)
+    assert {name for name in found if name.startswith("selectors/")} == {"selectors/_selection.py"}
+
+
+def test_the_names_of_sources_are_no_paths_of_the_machine():
+    assert all(not Path(name).is_absolute() for name in files("workflow.commands.select", "selectors.maxmin"))
+
+
+def test_an_import_that_is_marked_is_no_source():
+    found = files("workflow.commands.select")
+    assert "scenes/load.py" in found
+    assert not any(name.startswith("reports/") for name in found), "drawing a choice does not make it another"
+
+
+def test_relative_imports_are_followed_like_absolute_ones(tmp_path, monkeypatch):
+    (tmp_path / "a").mkdir()
+    for name, text in {
+        "a/one.py": "from .two import x\nfrom . import three\n",
+        "a/two.py": "def f():\n    from ..b import y\n",
+        "a/three.py": "import viewbench.c\nimport json\n",
+        "b.py": "from .d import z  # no source: a test says so\n",
+        "c.py": "",
+        "d.py": "",
+    }.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(sources, "PACKAGE", tmp_path)
+    for cached in (sources._closure, sources.imports, sources._file, sources._hash):
+        cached.cache_clear()
+    found = set(sources.sources("a.one"))
+    for cached in (sources._closure, sources.imports, sources._file, sources._hash):
+        cached.cache_clear()
+    assert found == {"a/one.py", "a/two.py", "a/three.py", "b.py", "c.py"}
 
 
 def test_reports_do_not_depend_on_what_made_the_results():
@@ -38,7 +69,7 @@ def test_data_flows_one_way():
     for number, folder in enumerate(order):
         for path in (PACKAGE / folder).rglob("*.py"):
             module = ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
-            for imported in _sources._imports(module):
+            for imported in sources.imports(module):
                 first = imported.split(".")[0]
                 assert order.index(first) <= number, f"{module} imports {imported}, which is to its right"
 
@@ -54,13 +85,13 @@ print(*[name for name in sys.modules if name.startswith("viewbench.")], file=sys
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=PACKAGE, check=True)
     loaded = {name.removeprefix("viewbench.") for name in done.stderr.split()}
     declared = {
-        ".".join(_sources.Path(path).with_suffix("").parts).removesuffix(".__init__")
+        ".".join(Path(path).with_suffix("").parts).removesuffix(".__init__")
         for path in files("workflow.commands.select", "selectors.uniform", "scenes.formats.transforms")
     }
-    undeclared = {name for name in loaded - declared if _sources._file(name)}
+    undeclared = {name for name in loaded - declared if sources._file(name)}
     assert {name for name in undeclared if not name.startswith("scenes.formats.")} <= {"workflow.commands._main"}
 
 
 def test_an_unknown_module_is_an_error():
     with pytest.raises(FileNotFoundError):
-        _sources.sources("selectors.nothing")
+        sources.sources("selectors.nothing")

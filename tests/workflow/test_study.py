@@ -39,10 +39,31 @@ def test_the_grid_is_complete_and_has_nothing_twice(load):
     cells = study.cells()
     keys = {tuple(cell.values()) for cell in cells}
     assert len(keys) == len(cells)
-    # per scene: (random + places) x 2 ratios x 3 seeds, coverage x 2 ratios x 1 seed, and the full-data reference
-    assert len(cells) == 2 * (2 * 2 * 3 + 1 * 2 * 1 + 1)
-    assert {cell["seed"] for cell in cells if cell["selector"] == "coverage"} == {"0"}
-    assert [(cell["ratio"], cell["seed"]) for cell in cells if cell["selector"] == "full"] == [("1.0", "0")] * 2
+    # per scene and seed: three selectors, of which one has no randomness, x 2 ratios, and the full-data reference
+    assert len(cells) == 2 * 3 * (3 * 2 + 1)
+    for selector in ("coverage", "full"):
+        assert {cell["seed"] for cell in cells if cell["selector"] == selector} == {"0", "1", "2"}
+
+
+def test_a_backend_may_run_a_part_of_the_grid(load):
+    part = {"scenes": ["room_human"], "selectors": ["random"], "ratios": [0.2], "seeds": [1], "reference": False}
+    study = load(backends=["splat", {"name": "some", "backend": "splat", "grid": part}])
+    (cell,) = [cell for cell in study.cells() if cell["backend"] == "some"]
+    assert list(cell.values()) == ["some", "room_human", "random", "0.2", "1"]
+    with pytest.raises(UserError, match="has selector 'coverge', which the study does not have; did you mean"):
+        load(backends=[{"backend": "splat", "grid": {"selectors": ["coverge"]}}])
+
+
+def test_one_line_chooses_the_start_of_every_trainer_that_can_be_told(load):
+    other = {"name": "told", "backend": "splat", "options": {"points": "rays"}}
+    study = load(backends=["splat", other, "instant-ngp"], points="sweep")
+    assert [entry.options for entry in study.backends] == [{"points": "sweep"}, {"points": "rays"}, {}]
+
+
+def test_greedy_orders_are_those_that_say_so(load):
+    entries = [{"name": "drawn", "selector": "logdet", "parameters": {"sample": True}}, "logdet", "uniform", "maxmin"]
+    study = load(selectors=entries)
+    assert [study.selector(name).greedy for name in ("drawn", "logdet", "uniform", "maxmin")] == [0, 1, 0, 1]
 
 
 def test_only_selectors_that_use_semantics_need_features(load):

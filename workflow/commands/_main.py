@@ -7,9 +7,9 @@ import sys
 
 import click
 
-from viewbench import __version__
-from viewbench.common import plugins
-from viewbench.common.errors import UserError
+from ... import __version__
+from ...common import plugins
+from ...common.errors import UserError
 
 PACKAGE = "workflow.commands"
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from viewbench.common.errors import UserError
+from ...common.errors import UserError
 
 scene_argument = click.argument("scene")
 format_option = click.option("--format", "format_", metavar="NAME", help="Force a reader (viewbench list formats).")
@@ -16,7 +16,23 @@ holdout_option = click.option(
 )
 outside_option = click.option("--allow-outside", is_flag=True, help="Let transforms name images outside the folder.")
 encoder_option = click.option("--encoder", metavar="NAME", help="Image encoder (viewbench list encoders).")
+count_rule_option = click.option(
+    "--count-rule",
+    type=click.Choice(["round", "floor"]),
+    default="round",
+    help="How a ratio becomes a number of views; floor is the paper's authors'.",
+)
 out_option = click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder to write.")
+
+
+def open_scene(name: str, settings: Any, **options: Any) -> Any:
+    """As `scenes.load.open_scene`; says on stderr what the reader dropped or assumed."""
+    from ...scenes.load import open_scene as opened
+
+    scene = opened(name, settings, **options)
+    for note in scene.notes:
+        print(f"viewbench: {scene.name}: {note}", file=sys.stderr)
+    return scene
 
 
 def settings_of(values: tuple[str, ...]) -> dict[str, Any]:

@@ -11,10 +11,11 @@ import click
 @click.option("--partial", is_flag=True, help="Keep unfinished cells as rows that say what is missing.")
 def command(study: str, results: Path, partial: bool) -> None:
     """Write results.csv of STUDY: one row a cell, read from the cells' JSON files."""
-    from viewbench.common import settings as settings_file
-    from viewbench.workflow import _collect, _study
+    from ...common import settings as settings_file
+    from .. import _collect, _study
 
-    checked = _study.load(study, settings_file.load())
-    rows = _collect.collect(checked, results / checked.name, partial=partial)
+    settings = settings_file.load()
+    checked = _study.load(study, settings)
+    rows = _collect.collect(checked, results / checked.name, settings, partial=partial)
     failed = sum(row["status"] != "ok" for row in rows)
     click.echo(f"{len(rows) - failed} of {len(rows)} cells in {results / checked.name / 'results.csv'}")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from viewbench.workflow.commands import _options
+from . import _options
 
 
 @click.command()
@@ -29,10 +29,11 @@ def command(
     """Write all views of SCENE to --out in the format --to."""
     import numpy as np
 
-    from viewbench.common import settings as settings_file
-    from viewbench.scenes.load import open_scene
-    from viewbench.scenes.subset import write_scene
+    from ...common import settings as settings_file
+    from ...scenes.subset import write_scene
 
-    opened = open_scene(scene, settings_file.load(), format=format_, holdout=holdout, allow_outside=allow_outside)
+    opened = _options.open_scene(
+        scene, settings_file.load(), format=format_, holdout=holdout, allow_outside=allow_outside
+    )
     write_scene(opened, np.arange(len(opened.train)), out, to, copy, force)
     click.echo(f"{len(opened.train)} training and {len(opened.test)} test views in {out}")

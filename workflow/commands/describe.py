@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from viewbench.workflow.commands import _options
+from . import _options
 
 SAMPLE = 5000  # points kept for the figures
 
@@ -19,11 +19,11 @@ def command(scene: str, out: Path, width: int | None, format_: str | None, holdo
     """Write positions and viewing directions of both splits of SCENE as JSON."""
     import numpy as np
 
-    from viewbench.common import settings as settings_file
-    from viewbench.common.files import write_json
-    from viewbench.scenes.digest import scene_sha256
-    from viewbench.scenes.load import open_scene
-    from viewbench.scenes.types import Split
+    from ...common import settings as settings_file
+    from ...common.files import write_json
+    from ...scenes.digest import scene_sha256
+    from ...scenes.load import open_scene
+    from ...scenes.types import Split
 
     settings = settings_file.load()
     opened = open_scene(scene, settings, format=format_, holdout=holdout)
@@ -65,8 +65,8 @@ def _write_truth(test, width: int, folder: Path) -> None:
     """The test images as they are compared with, for the pictures in the reports."""
     import numpy as np
 
-    from viewbench.scenes.images import load_images
-    from viewbench.scenes.pictures import picture_name, save_png, to_uint8
+    from ...scenes.images import load_images
+    from ...scenes.pictures import picture_name, save_png, to_uint8
 
     images, _ = load_images(test, np.arange(len(test)), width)
     for number, (name, image) in enumerate(zip(test.names, images, strict=True)):

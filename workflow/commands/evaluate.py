@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from viewbench.workflow.commands import _options
+from . import _options
 
 
 @click.command()
@@ -15,12 +15,11 @@ from viewbench.workflow.commands import _options
 @_options.holdout_option
 def command(model: Path, scene: str, out: Path, format_: str | None, holdout: str | None) -> None:
     """Render the test views of SCENE with the model in the folder MODEL; write metrics.json and the renders."""
-    from viewbench.backends._evaluate import evaluate
-    from viewbench.common import settings as settings_file
-    from viewbench.scenes.load import open_scene
+    from ...backends._evaluate import evaluate
+    from ...common import settings as settings_file
 
     settings = settings_file.load()
-    opened = open_scene(scene, settings, format=format_, holdout=holdout)
+    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout)
     record = evaluate(model, opened, out, settings=settings, progress=_options.progress("evaluate"))
     text = [f"{len(record['views'])} test views"]
     for metric, unit in (("psnr_db", " dB PSNR"), ("ssim", " SSIM"), ("lpips", " LPIPS")):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from viewbench.workflow.commands import _options
+from . import _options
 
 
 @click.command()
@@ -15,12 +15,11 @@ from viewbench.workflow.commands import _options
 @_options.holdout_option
 def command(scene: str, encoder: str | None, out: Path | None, format_: str | None, holdout: str | None) -> None:
     """Embed the training views of SCENE; what is in the cache already is not embedded again."""
-    from viewbench.common import settings as settings_file
-    from viewbench.scenes import features
-    from viewbench.scenes.load import open_scene
+    from ...common import settings as settings_file
+    from ...scenes import features
 
     settings = settings_file.load()
-    opened = open_scene(scene, settings, format=format_, holdout=holdout)
+    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout)
     name = encoder or settings.features.encoder
     cache, batch, device = Path(settings.features.cache), settings.features.batch, settings.compute.device
     rows = features.features(opened.train, name, cache, batch, _options.progress("features"), device)

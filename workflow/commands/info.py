@@ -4,7 +4,7 @@ import json
 
 import click
 
-from viewbench.workflow.commands import _options
+from . import _options
 
 
 @click.command()
@@ -15,10 +15,10 @@ from viewbench.workflow.commands import _options
 @_options.outside_option
 def command(scene: str, as_json: bool, format_: str | None, holdout: str | None, allow_outside: bool) -> None:
     """Say what was detected in SCENE, a folder or a name of environment.toml."""
-    from viewbench.common import settings as settings_file
-    from viewbench.common.files import plain
-    from viewbench.scenes.load import open_scene
-    from viewbench.scenes.summary import summary
+    from ...common import settings as settings_file
+    from ...common.files import plain
+    from ...scenes.load import open_scene
+    from ...scenes.summary import summary
 
     facts = summary(
         open_scene(scene, settings_file.load(), format=format_, holdout=holdout, allow_outside=allow_outside)

@@ -16,7 +16,7 @@ def command(kind: str) -> None:
 
 
 def _plugins(kind: str) -> list[tuple[str, str]]:
-    from viewbench.common import plugins
+    from ...common import plugins
 
     package = {"formats": "scenes.formats", "encoders": "scenes.encoders"}.get(kind, kind)
     rows = []
@@ -29,9 +29,9 @@ def _plugins(kind: str) -> list[tuple[str, str]]:
 
 
 def _scenes() -> list[tuple[str, str]]:
-    from viewbench.common import settings as settings_file
-    from viewbench.common.errors import UserError
-    from viewbench.scenes.load import open_scene
+    from ...common import settings as settings_file
+    from ...common.errors import UserError
+    from ...scenes.load import open_scene
 
     settings = settings_file.load()
     rows = []
@@ -46,9 +46,9 @@ def _scenes() -> list[tuple[str, str]]:
 
 
 def _backends() -> list[tuple[str, str]]:
-    from viewbench.backends import _registry
-    from viewbench.common import plugins
-    from viewbench.common import settings as settings_file
+    from ...backends import _registry
+    from ...common import plugins
+    from ...common import settings as settings_file
 
     settings = settings_file.load()
     rows = []
@@ -62,9 +62,9 @@ def _backends() -> list[tuple[str, str]]:
 
 
 def _studies() -> list[tuple[str, str]]:
-    from viewbench.common import settings as settings_file
-    from viewbench.common.errors import UserError
-    from viewbench.workflow import _study
+    from ...common import settings as settings_file
+    from ...common.errors import UserError
+    from .. import _study
 
     settings = settings_file.load()
     rows = []

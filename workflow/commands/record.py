@@ -16,9 +16,9 @@ def command(folder: Path, name: str | None, into: Path | None, commands: tuple[s
     import shutil
     from importlib import metadata
 
-    from viewbench.common.errors import UserError
-    from viewbench.common.files import read_json, whole_folder, write_json
-    from viewbench.common.settings import PACKAGE
+    from ...common.errors import UserError
+    from ...common.files import read_json, whole_folder, write_json
+    from ...common.settings import PACKAGE
 
     study = read_json(folder / "study.json", "study")
     trained = sorted(folder.glob("cells/*/*/*/*/*/train.json"))

@@ -11,10 +11,10 @@ import click
 @click.option("--page", is_flag=True, help="Only put the page together from the reports already drawn.")
 def command(folder: Path, only: str | None, page: bool) -> None:
     """Draw the reports of the study in FOLDER (results/STUDY) and put them into reports/index.html."""
-    from viewbench.common.errors import UserError
-    from viewbench.common.files import read_json
-    from viewbench.reports._run import page as put_together
-    from viewbench.reports._run import run as draw
+    from ...common.errors import UserError
+    from ...common.files import read_json
+    from ...reports._run import page as put_together
+    from ...reports._run import run as draw
 
     if not (folder / "results.csv").is_file():
         raise UserError(f"'{folder}' has no results.csv; give the folder of a study, such as results/quick")

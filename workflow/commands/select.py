@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from viewbench.workflow.commands import _options
+from . import _options
 
 
 @click.command()
@@ -14,6 +14,7 @@ from viewbench.workflow.commands import _options
 @click.option("--selector", default="maxmin", show_default=True, help="Way of choosing (viewbench list selectors).")
 @click.option("--ratio", type=float, help="Share of the training views, in (0, 1].")
 @click.option("--count", type=int, help="Number of views, instead of --ratio.")
+@_options.count_rule_option
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the choice.")
 @click.option("--alpha", type=float, help="Weight of the position factor; 0.7.")
 @click.option("--beta", type=float, help="Weight of the rotation factor; 0.2. The semantic one gets the rest.")
@@ -37,23 +38,23 @@ def command(**given: Any) -> None:
     """Choose views of SCENE and write them to --out, in the format that was read, with selection.json."""
     import numpy as np
 
-    from viewbench.common import settings as settings_file
-    from viewbench.common.errors import UserError
-    from viewbench.common.files import write_json
-    from viewbench.scenes.load import open_scene
-    from viewbench.scenes.validate import check_present
-    from viewbench.selectors import _run
+    from ...common import settings as settings_file
+    from ...common.errors import UserError
+    from ...common.files import write_json
+    from ...scenes.validate import check_present
+    from ...selectors import _run
+    from ...selectors._selection import count_of
 
     if (given["ratio"] is None) == (given["count"] is None):
         raise UserError("give either --ratio or --count")
     if not (given["out"] or given["selection"] or given["dry_run"]):
         raise UserError("give --out FOLDER, or --dry-run to see the choice without writing it")
     if given["plot"]:
-        from viewbench.reports._selection_plot import kind_of, plot
+        from ...reports._selection_plot import kind_of, plot  # no source: it draws what was chosen
 
         kind_of(given["plot"])
     settings = settings_file.load()
-    scene = open_scene(
+    scene = _options.open_scene(
         given["scene"],
         settings,
         format=given["format_"],
@@ -62,7 +63,7 @@ def command(**given: Any) -> None:
     )
     check_present(scene)
     n = len(scene.train)
-    count = given["count"] if given["ratio"] is None else _run.count_of(given["ratio"], n)
+    count = given["count"] if given["ratio"] is None else count_of(given["ratio"], n, given["count_rule"])
     parameters = _options.settings_of(given["options"])
     named = ("alpha", "beta", "sigma", "start", "sharpness")
     parameters |= {key: given[key] for key in named if given[key] is not None}
@@ -80,11 +81,14 @@ def command(**given: Any) -> None:
     if given["selection"]:
         write_json(given["selection"], record)
     if given["out"] and not given["dry_run"]:
-        from viewbench.scenes.subset import write_subset
+        from ...scenes.subset import write_subset  # no source: it writes what was chosen
 
         written = write_subset(scene, record, given["out"], copy=given["copy"], force=given["force"])
         if written != scene.format:
             click.echo(f"viewbench: format {scene.format} is only read; the subset is written as {written}", err=True)
+        if (given["out"] / "transforms_test.json").is_file():
+            hint = "the 3DGS authors' train.py trains on transforms_test.json too unless it is given --eval"
+            click.echo(f"viewbench: {hint}", err=True)
     if given["plot"]:
         title = f"{scene.name}: {count} of {n} views by {given['selector']}"
         cameras = scene.train.cameras
@@ -96,10 +100,10 @@ def command(**given: Any) -> None:
 
 def _features(scene: Any, given: dict[str, Any], parameters: dict[str, Any], settings: Any) -> Any:
     """The features that the selector needs: the user's own, the cached ones, or None without the semantic factor."""
-    from viewbench.common import plugins
+    from ...common import plugins
 
     if given["features"] is not None:
-        from viewbench.scenes.features import load_user_features
+        from ...scenes.features import load_user_features
 
         return load_user_features(given["features"], len(scene.train))
     plugins.load("selectors", given["selector"])
@@ -107,7 +111,7 @@ def _features(scene: Any, given: dict[str, Any], parameters: dict[str, Any], set
     encoder = given["encoder"] or settings.features.encoder
     if "sem" not in tuple(factors) or encoder == "none":
         return None
-    from viewbench.scenes.features import features
+    from ...scenes.features import features
 
     cache = Path(settings.features.cache)
     progress = _options.progress("features")
@@ -116,6 +120,6 @@ def _features(scene: Any, given: dict[str, Any], parameters: dict[str, Any], set
 
 def _sharpness(scene: Any, settings: Any) -> Any:
     """How sharp each training image is, measured once and kept."""
-    from viewbench.scenes.sharpness import sharpness
+    from ...scenes.sharpness import sharpness
 
     return sharpness(scene.train, Path(settings.features.cache), _options.progress("sharpness"))

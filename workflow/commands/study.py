@@ -11,11 +11,11 @@ import click
 @click.option("--out", type=click.Path(path_type=Path), help="Write the checked study as JSON.")
 def command(study: str, out: Path | None) -> None:
     """Check STUDY, the name of one that ships or a file, and print it with its defaults filled in."""
-    from viewbench.common import settings as settings_file
-    from viewbench.common.files import plain, write_json
-    from viewbench.workflow import _study
+    from ...common import settings as settings_file
+    from ...common.files import plain, write_json
+    from .. import _study
 
-    record = _study.as_json(_study.load(study, settings_file.load()))
+    record = _study.load(study, settings_file.load()).record()
     if out is not None:
         write_json(out, record)
     else:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from viewbench.workflow.commands import _options
+from . import _options
 
 
 @click.command()
@@ -16,11 +16,11 @@ def command(study: str, results: Path, cell: str | None, stamp: Path | None) -> 
     """Log the finished cells of STUDY: new ones and changed ones; a cell never has two runs."""
     import sys
 
-    from viewbench.common import settings as settings_file
-    from viewbench.common.errors import UserError
-    from viewbench.common.files import write_json
-    from viewbench.reports import _tracking
-    from viewbench.workflow import _study
+    from ...common import settings as settings_file
+    from ...common.errors import UserError
+    from ...common.files import write_json
+    from ...reports import _tracking
+    from .. import _collect, _study
 
     settings = settings_file.load()
     checked = _study.load(study, settings)
@@ -29,6 +29,8 @@ def command(study: str, results: Path, cell: str | None, stamp: Path | None) -> 
         cells = [row for row in cells if "/".join(row[key] for key in _tracking.KEY) == cell]
         if not cells:
             raise UserError(f"study '{study}' has no cell '{cell}'")
+    else:
+        cells = _collect.without_stale(cells, results / checked.name)
     done: dict = {"skipped": "tracking.uri is empty"}
     try:
         if settings.tracking.uri:

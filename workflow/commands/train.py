@@ -4,12 +4,15 @@ from pathlib import Path
 
 import click
 
-from viewbench.workflow.commands import _options
+from . import _options
 
 
 @click.command()
 @_options.scene_argument
 @click.option("--selection", type=click.Path(path_type=Path), required=True, help="selection.json of viewbench select.")
+@click.option("--ratio", type=float, help="Take the first views of the selection only: this share of all.")
+@click.option("--count", type=int, help="Take so many of its first views, instead of --ratio.")
+@_options.count_rule_option
 @click.option("--backend", default="splat", show_default=True, help="Trainer (viewbench list backends).")
 @_options.out_option
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the training.")
@@ -22,6 +25,9 @@ from viewbench.workflow.commands import _options
 def command(
     scene: str,
     selection: Path,
+    ratio: float | None,
+    count: int | None,
+    count_rule: str,
     backend: str,
     out: Path,
     seed: int,
@@ -34,20 +40,28 @@ def command(
 ) -> None:
     """Train one model on the chosen views of SCENE and write it, with train.json, into one folder.
 
-    Without --iterations and --seconds the backend's own default number of iterations is used.
+    --ratio and --count take the first views of a greedy selector's order, which are what it would choose for that
+    number. Without --iterations and --seconds the backend's own default number of iterations is used.
     """
-    from viewbench.backends import _registry
-    from viewbench.backends._train import load_selection, train
-    from viewbench.backends._types import Budget
-    from viewbench.common import settings as settings_file
-    from viewbench.scenes.load import open_scene
+    from ...backends import _registry
+    from ...backends._train import train
+    from ...backends._types import Budget
+    from ...common import settings as settings_file
+    from ...common.errors import UserError
+    from ...selectors._selection import count_of, first_views, load_selection
 
     settings = settings_file.load()
     if iterations is None and seconds is None:
         iterations = _registry.load(backend, settings).CAPABILITIES.default_iterations
+    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout)
+    chosen = load_selection(selection)
+    if ratio is not None and count is not None:
+        raise UserError("give --ratio or --count, not both")
+    if ratio is not None:
+        count = count_of(ratio, len(opened.train), count_rule)
     record = train(
-        open_scene(scene, settings, format=format_, holdout=holdout),
-        load_selection(selection),
+        opened,
+        chosen if count is None else first_views(chosen, count),
         backend,
         out,
         settings=settings,

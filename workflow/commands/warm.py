@@ -7,8 +7,8 @@ import click
 @click.option("--backend", default="splat", show_default=True, help="Trainer to prepare.")
 def command(backend: str) -> None:
     """Compile and cache whatever BACKEND compiles; backends that compile nothing return at once."""
-    from viewbench.backends import _registry
-    from viewbench.common import settings as settings_file
+    from ...backends import _registry
+    from ...common import settings as settings_file
 
     warm = getattr(_registry.load(backend, settings_file.load()), "warm", None)
     if warm is not None:

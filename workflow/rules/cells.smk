@@ -1,64 +1,66 @@
-# The three steps of a cell.
+# The steps of a cell: a choice, which several cells may share, a model and its score.
 
-CELL = f"{RESULTS}/cells/{CELLS.wildcard_pattern}"
+CELL = f"{RESULTS}/cells/{AXES}"
 
 
 rule select:
     input:
-        scene=f"{RESULTS}/scenes/{{scene}}.json",
+        scene=WIRING.scene,
         features=WIRING.features,
-        sources=WIRING.selector_sources,
+        depends=WIRING.choosing,
     output:
-        f"{CELL}/selection.json",
+        f"{RESULTS}/selections/{{scene}}/{{selector}}/{{part}}/{{seed}}.json",
     log:
-        f"{RESULTS}/logs/select/{CELLS.wildcard_pattern}.log",
+        f"{RESULTS}/logs/select/{{scene}}/{{selector}}/{{part}}/{{seed}}.log",
     params:
         selector=lambda wildcards: STUDY.selector(wildcards.selector).selector,
         options=WIRING.selector_options,
     message:
-        "select {wildcards.scene}: {wildcards.selector}, ratio {wildcards.ratio}, seed {wildcards.seed}"
+        "select {wildcards.scene}: {wildcards.selector}, ratio {wildcards.part}, seed {wildcards.seed}"
     shell:
-        "viewbench select {wildcards.scene:q} --selector {params.selector:q} --ratio {wildcards.ratio}"
+        "viewbench select {wildcards.scene:q} --selector {params.selector:q} --ratio {wildcards.part}"
         " --seed {wildcards.seed} {params.options} --selection {output:q} > /dev/null 2> {log:q}"
 
 
 rule train:
     input:
-        scene=f"{RESULTS}/scenes/{{scene}}.json",
-        selection=f"{CELL}/selection.json",
+        scene=WIRING.scene,
+        selection=WIRING.selection,
         warm=f"{RESULTS}/warm/{{backend}}",
-        sources=WIRING.backend_sources,
+        depends=WIRING.training,
     output:
-        f"{CELL}/train.json",
+        train=f"{CELL}/train.json",
+        selection=f"{CELL}/selection.json",
     log:
-        f"{RESULTS}/logs/train/{CELLS.wildcard_pattern}.log",
+        f"{RESULTS}/logs/train/{AXES}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/train/{CELLS.wildcard_pattern}.tsv"
+        f"{RESULTS}/benchmarks/train/{AXES}.tsv"
     threads: SETTINGS.compute.threads
     resources:
         gpu=WIRING.gpu,
     params:
-        folder=subpath(output[0], parent=True),
+        folder=subpath(output.train, parent=True),
         backend=lambda wildcards: STUDY.backend(wildcards.backend).backend,
         options=WIRING.backend_options,
     message:
         "train {wildcards.scene}: {wildcards.selector}, ratio {wildcards.ratio}, seed {wildcards.seed}, {wildcards.backend}"
     shell:
-        "viewbench train {wildcards.scene:q} --selection {input.selection:q} --backend {params.backend:q}"
-        " --seed {wildcards.seed} {params.options} --out {params.folder:q} > /dev/null 2> {log:q}"
+        "viewbench train {wildcards.scene:q} --selection {input.selection:q} --ratio {wildcards.ratio}"
+        " --backend {params.backend:q} --seed {wildcards.seed} {params.options} --out {params.folder:q}"
+        " > /dev/null 2> {log:q}"
 
 
 rule evaluate:
     input:
-        scene=f"{RESULTS}/scenes/{{scene}}.json",
+        scene=WIRING.scene,
         train=f"{CELL}/train.json",
-        sources=WIRING.sources("evaluate", "workflow.commands.evaluate"),
+        depends=WIRING.scoring,
     output:
         f"{CELL}/metrics.json",
     log:
-        f"{RESULTS}/logs/evaluate/{CELLS.wildcard_pattern}.log",
+        f"{RESULTS}/logs/evaluate/{AXES}.log",
     benchmark:
-        f"{RESULTS}/benchmarks/evaluate/{CELLS.wildcard_pattern}.tsv"
+        f"{RESULTS}/benchmarks/evaluate/{AXES}.tsv"
     # A cell that is trained is scored before the next one starts, so that results come in as the study runs.
     priority: 10
     threads: SETTINGS.compute.threads

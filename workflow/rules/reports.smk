@@ -1,6 +1,6 @@
 # What is done with the finished cells.
 
-METRICS = expand(f"{RESULTS}/cells/{{cell}}/metrics.json", cell=CELLS.instance_patterns)
+METRICS = expand(f"{RESULTS}/cells/{{cell}}/metrics.json", cell=CELLS)
 
 
 rule collect:
@@ -8,7 +8,7 @@ rule collect:
         cells=METRICS,
         scenes=expand(f"{RESULTS}/scenes/{{scene}}.json", scene=STUDY.scenes),
         study=f"{RESULTS}/study.json",
-        sources=WIRING.sources("collect", "workflow.commands.collect"),
+        depends=WIRING.command("collect"),
     output:
         f"{RESULTS}/results.csv",
     log:
@@ -26,15 +26,16 @@ rule collect:
 rule track_cell:
     input:
         f"{CELL}/metrics.json",
-        WIRING.sources("track", "workflow.commands.track"),
+        WIRING.command("track"),
     output:
-        f"{RESULTS}/tracked/{CELLS.wildcard_pattern}.json",
+        f"{RESULTS}/tracked/{AXES}.json",
     log:
-        f"{RESULTS}/logs/track/{CELLS.wildcard_pattern}.log",
+        f"{RESULTS}/logs/track/{AXES}.log",
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,
-        cell=CELLS.wildcard_pattern,
+        cell=AXES,
+        tracking=WIRING.tracking,
     message:
         "log {wildcards.scene}/{wildcards.selector}/{wildcards.ratio}/{wildcards.seed} to MLflow"
     shell:
@@ -48,11 +49,11 @@ rule track:
     input:
         results=f"{RESULTS}/results.csv",
         cells=(
-            expand(f"{RESULTS}/tracked/{{cell}}.json", cell=CELLS.instance_patterns)
+            expand(f"{RESULTS}/tracked/{{cell}}.json", cell=CELLS)
             if WIRING.tracks_as_it_goes
             else []
         ),
-        sources=WIRING.sources("track", "workflow.commands.track"),
+        depends=WIRING.command("track"),
     output:
         f"{RESULTS}/tracked.json",
     log:
@@ -60,6 +61,7 @@ rule track:
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,
+        tracking=WIRING.tracking,
     message:
         "log the cells to MLflow"
     shell:
@@ -70,7 +72,7 @@ rule report:
     input:
         f"{RESULTS}/results.csv",
         f"{RESULTS}/study.json",
-        WIRING.report_sources,
+        WIRING.report,
     output:
         f"{RESULTS}/reports/{{report}}.items.json",
     log:
@@ -86,7 +88,7 @@ rule report:
 rule page:
     input:
         expand(f"{RESULTS}/reports/{{report}}.items.json", report=STUDY.reports),
-        WIRING.page_sources,
+        WIRING.page,
     output:
         f"{RESULTS}/reports/index.html",
     log:

@@ -4,7 +4,6 @@
 rule study:
     input:
         WIRING.study_file,
-        WIRING.sources("study", "workflow.commands.study"),
     output:
         f"{RESULTS}/study.json",
     log:
@@ -18,16 +17,18 @@ rule study:
         "viewbench study {params.study:q} --out {output:q} 2> {log:q}"
 
 
+# For the reports; no selection, model or score depends on it.
 rule describe:
     input:
-        scene=WIRING.scene_files,
-        sources=WIRING.sources("describe", "workflow.commands.describe"),
+        scene=WIRING.scene,
+        depends=WIRING.command("describe"),
     output:
         f"{RESULTS}/scenes/{{scene}}.json",
     log:
         f"{RESULTS}/logs/describe/{{scene}}.log",
     params:
         width=WIRING.truth_width,
+        dataset=WIRING.dataset,
     message:
         "describe {wildcards.scene}"
     shell:
@@ -36,10 +37,8 @@ rule describe:
 
 rule features:
     input:
-        scene=f"{RESULTS}/scenes/{{scene}}.json",
-        sources=WIRING.sources(
-            "features", "workflow.commands.features", WIRING.encoder_module
-        ),
+        scene=WIRING.scene,
+        depends=WIRING.encoder,
     output:
         f"{RESULTS}/features/{{scene}}.npy",
     log:
@@ -55,9 +54,10 @@ rule features:
         "viewbench features {wildcards.scene:q} --encoder {params.encoder:q} --out {output:q} 2> {log:q}"
 
 
+# Runs again exactly when the trainings do that wait for it.
 rule warm:
     input:
-        WIRING.warm_sources,
+        WIRING.training,
     output:
         touch(f"{RESULTS}/warm/{{backend}}"),
     log:

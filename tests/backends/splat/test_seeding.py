@@ -5,18 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from viewbench.backends._surroundings import surroundings
 from viewbench.backends._types import TrainingSet
+from viewbench.backends.splat import seeding
 from viewbench.backends.splat.depth_maps import depth_maps
 from viewbench.backends.splat.layout import LOGIT, MEAN
 from viewbench.backends.splat.neighbours import neighbours
 from viewbench.backends.splat.options import Options
 from viewbench.backends.splat.plane_sweep import sweep
-from viewbench.backends.splat.seeding import along_rays, camera_extent, seed
+from viewbench.backends.splat.seeding import along_rays
 from viewbench.backends.splat.shell import shell
 from viewbench.common.errors import UserError
 from viewbench.scenes.types import Cameras, Points
 
 SIZE, HALF_ROOM = 48, 2.0
+
+
+def seed(data, o, rng):
+    """The start as a training makes it: of what this source may know."""
+    data = replace(data, points=seeding.known_points(data, o.points))
+    return seeding.seed(data, o, surroundings(data.training, data.points), rng)
 
 
 def cameras(positions, angles):
@@ -58,7 +66,7 @@ def room(positions, angles, points=None):
         depths.append(depth.reshape(SIZE, SIZE))
     k = len(images)
     names = tuple(map(str, range(k)))
-    data = TrainingSet("room", names, views, np.stack(images).astype(np.float32), points, np.arange(k))
+    data = TrainingSet("room", names, views, np.stack(images).astype(np.float32), points, np.arange(k), views)
     return data, np.stack(depths)
 
 
@@ -82,7 +90,7 @@ def on_walls(points):
 
 def test_depths_that_are_believed_are_right(walk):
     data, truth = walk
-    maps = depth_maps(data, camera_extent(data), np.random.default_rng(0))
+    maps = depth_maps(data, surroundings(data.training, data.points).depths, np.random.default_rng(0))
     assert maps.depth.shape == truth.shape  # small pictures are not made smaller
     error = np.abs(maps.depth - truth) / truth
     assert maps.sure.mean() > 0.2
@@ -218,7 +226,7 @@ def test_the_unit_of_length_does_not_matter(walk, factor):
     poses = data.cameras.c2w.copy()
     poses[:, :3, 3] *= factor
     cameras_ = replace(data.cameras, c2w=poses)
-    larger = replace(data, cameras=cameras_, points=Points(walls * factor, data.points.rgb))
+    larger = replace(data, cameras=cameras_, training=cameras_, points=Points(walls * factor, data.points.rgb))
     first, record = seed(data, options(), np.random.default_rng(0))
     second, other = seed(larger, options(), np.random.default_rng(0))
     assert record == other
@@ -256,7 +264,8 @@ def test_the_shell_has_the_colours_that_look_its_way(walk):
     images = np.zeros((4, SIZE, SIZE, 3), np.float32)
     images[0], images[1], images[2:] = [1, 0, 0], [0, 1, 0], [0, 0, 1]  # red along x, green along z, blue behind
     data = replace(data, cameras=level, images=images, chosen=np.arange(4))
-    positions, colours, size = shell(data, 400, 2.0)
+    around = replace(surroundings(data.training, None), centre=np.zeros(3), extent=2.0)
+    positions, colours, size = shell(data, 400, around)
     np.testing.assert_allclose(np.linalg.norm(positions, axis=1), np.linalg.norm(positions[0]))
     unit = positions / np.linalg.norm(positions[0])
     assert (colours[unit[:, 0] > 0.95] == [1, 0, 0]).all()

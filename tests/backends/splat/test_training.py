@@ -40,7 +40,7 @@ def data():
     seen = cameras(9)
     images = np.stack(list(loop.draw(truth, seen, Rendering())))
     points = Points(truth[:3].T.astype(np.float64), np.full((60, 3), 128, np.uint8), tuple([np.array([0, 3, 6])] * 60))
-    return TrainingSet("toy", tuple(map(str, range(9))), seen, images, points, np.arange(9))
+    return TrainingSet("toy", tuple(map(str, range(9))), seen, images, points, np.arange(9), seen)
 
 
 def run(data, folder, iterations=200, seed=1, seconds=None, **options):
@@ -179,7 +179,8 @@ def test_a_scene_in_other_units_trains_as_well(data, tmp_path, factor):
     poses = data.cameras.c2w.copy()
     poses[:, :3, 3] *= factor
     points = Points(data.points.xyz * factor, data.points.rgb, data.points.seen_by)
-    scaled = replace(data, cameras=replace(data.cameras, c2w=poses), points=points)
+    moved = replace(data.cameras, c2w=poses)
+    scaled = replace(data, cameras=moved, training=moved, points=points)
     run(data, tmp_path / "metres", 150, gaussians=500)
     run(scaled, tmp_path / "scaled", 150, gaussians=500)
     assert abs(score(tmp_path / "metres", data) - score(tmp_path / "scaled", scaled)) < 0.3

@@ -1,0 +1,128 @@
+"""What a model says it was made from, and what a killed run may be taken up for."""
+
+import dataclasses
+import json
+import shutil
+
+import pytest
+
+from viewbench.backends import _evaluate, _train
+from viewbench.backends._types import Budget
+from viewbench.common.errors import UserError
+from viewbench.common.files import sha256_file, sha256_folder
+from viewbench.common.settings import load as load_settings
+from viewbench.scenes.digest import scene_sha256
+from viewbench.scenes.load import open_scene
+from viewbench.selectors import _run
+from viewbench.selectors._selection import selection_sha256
+
+SETTINGS = load_settings()
+
+
+def trained(folder, out, **changes):
+    scene = open_scene(str(folder), SETTINGS)
+    chosen = _run.run(scene, "uniform", 3, 0)
+    arguments = {"settings": SETTINGS, "seed": 0, "budget": Budget(4), "width": 48, "curve": False, **changes}
+    return scene, chosen, _train.train(scene, chosen, "splat", out, **arguments)
+
+
+def test_each_file_names_what_was_before_it(small_room, tmp_path):
+    scene, chosen, record = trained(small_room, tmp_path)
+    metrics = _evaluate.evaluate(tmp_path, scene, tmp_path, settings=SETTINGS)
+    stored = {name: json.loads((tmp_path / f"{name}.json").read_text()) for name in ("selection", "train", "metrics")}
+    assert {file["scene_sha256"] for file in stored.values()} == {scene_sha256(scene)}
+    assert {file["holdout"] for file in stored.values()} == {"given"}
+    assert stored["selection"] == chosen
+    assert stored["train"] == record
+    assert stored["metrics"] == metrics
+    assert record["selection_sha256"] == selection_sha256(chosen)
+    assert metrics["train_sha256"] == sha256_file(tmp_path / "train.json")
+    assert record["files"] == {name: sha256_file(tmp_path / name) for name in ("model.ply", "splat.json")}
+    assert all(len(file["code_sha256"]) == 64 for file in stored.values())
+
+
+def test_a_model_is_not_scored_on_another_version_of_its_scene(small_room, tmp_path):
+    shutil.copytree(small_room, tmp_path / "room")
+    trained(tmp_path / "room", tmp_path / "model")
+    images = sorted((tmp_path / "room" / "train").iterdir())
+    shutil.copy(images[1], images[0])
+    with pytest.raises(UserError, match=r"with holdout 'given' and hash .* but now .*; train again"):
+        _evaluate.evaluate(
+            tmp_path / "model", open_scene(str(tmp_path / "room"), SETTINGS), tmp_path / "model", settings=SETTINGS
+        )
+    assert not (tmp_path / "model" / "metrics.json").exists()
+
+
+@pytest.fixture
+def asked(small_room, tmp_path, monkeypatch):
+    """What a training is asked, as its working folder remembers it."""
+    seen = []
+    real = _train._work_folder
+
+    def spy(out, what, resumes):
+        seen.append(what)
+        return real(out, what, resumes)
+
+    monkeypatch.setattr(_train, "_work_folder", spy)
+    trained(small_room, tmp_path / "model")
+    monkeypatch.undo()
+    return seen[0]
+
+
+EVERYTHING = ["backend", "scene_sha256", "holdout", "selection_sha256", "code_sha256"]
+EVERYTHING += ["seed", "width", "budget", "options", "version"]
+
+
+def test_everything_that_a_model_depends_on_is_asked(asked):
+    assert set(EVERYTHING) <= set(asked)
+    assert asked["options"]["gaussians"] == 28000
+    assert dataclasses.asdict(Budget(4)) == asked["budget"]
+
+
+@pytest.mark.parametrize("key", [*EVERYTHING, None])
+def test_a_killed_run_is_taken_up_for_the_same_and_nothing_else(asked, tmp_path, key):
+    work = _train._work_folder(tmp_path, asked, resumes=True)
+    (work / "model" / "snapshot.npz").write_bytes(b"half way")
+    other = asked if key is None else {**asked, key: "other"}
+    _train._work_folder(tmp_path, other, resumes=True)
+    assert (work / "model" / "snapshot.npz").exists() == (key is None)
+    _train._work_folder(tmp_path, asked, resumes=False)
+    assert not (work / "model" / "snapshot.npz").exists()
+
+
+def test_another_choice_of_as_many_views_is_another_run(small_room, tmp_path):
+    first = trained(small_room, tmp_path / "a")[2]
+    scene = open_scene(str(small_room), SETTINGS)
+    other = _run.run(scene, "maxmin", 3, 5, {"factors": ["pos"]})
+    arguments = {"settings": SETTINGS, "seed": 0, "budget": Budget(4), "width": 48, "curve": False}
+    second = _train.train(scene, other, "splat", tmp_path / "b", **arguments)
+    assert first["selection_sha256"] != second["selection_sha256"]
+
+
+def test_a_folder_is_hashed_file_by_file(tmp_path):
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / "c").write_bytes(b"1")
+    (tmp_path / "a").write_bytes(b"2")
+    assert sha256_folder(tmp_path) == {"a": sha256_file(tmp_path / "a"), "b/c": sha256_file(tmp_path / "b" / "c")}
+
+
+def test_more_gaussians_than_room_are_an_error_and_no_crash(small_room):
+    import numpy as np
+
+    from viewbench.backends.splat.engine import Engine
+    from viewbench.backends.splat.layout import empty
+    from viewbench.backends.splat.options import Rendering
+    from viewbench.backends.splat.projection import camera_vectors
+
+    camera = camera_vectors(open_scene(str(small_room), SETTINGS).train.cameras[:1].scaled(48))[0]
+    engine = Engine(10, 48, 48, Rendering())
+    engine.draw(empty(10, 1), camera)
+    with pytest.raises(ValueError, match="11 Gaussians, made for at most 10"):
+        engine.draw(empty(11, 1), camera)
+    with pytest.raises(ValueError, match="was not drawn of these 50000"):
+        engine.differentiate(empty(50_000, 1), camera)
+    moments = np.zeros_like(empty(11, 1)), np.zeros_like(empty(11, 1))
+    with pytest.raises(ValueError, match="made for at most 10"):
+        engine.step(empty(11, 1), moments, camera, engine.planes.new(), np.zeros(23, np.float32), 1, 0.2)
+    engine.resize(11)
+    engine.draw(empty(11, 1), camera)

@@ -1,0 +1,131 @@
+"""A written COLMAP subset as the tools that it is for read it, with their default options.
+
+Nerfstudio's reader is its own code, imported from its package; what gsplat's examples and the 3DGS authors' code do is
+restated here, since no package has it: `examples/datasets/colmap.py` of gsplat and `scene/dataset_readers.py`.
+"""
+
+import importlib
+import sys
+from pathlib import Path
+from unittest.mock import MagicMock
+
+import numpy as np
+import pycolmap
+import pytest
+
+from tests.scenes.test_written import colmap, picture
+from viewbench.common.settings import load as load_settings
+from viewbench.scenes.load import open_scene
+from viewbench.scenes.subset import write_subset
+
+NAMES = [f"frame{number:02d}.png" for number in range(24)]
+CHOSEN = [20, 3, 7, 11, 15]  # in the order chosen
+
+
+@pytest.fixture
+def written(tmp_path):
+    """A capture of 24 frames with a smaller copy, every 4th held out, of whose 18 training frames five were chosen."""
+    folder = colmap(tmp_path / "in", NAMES)
+    model = pycolmap.Reconstruction(folder / "sparse" / "0")
+    for place in np.random.default_rng(0).uniform(-1, 1, (30, 3)):
+        model.add_point3D(place, pycolmap.Track(), np.array([9, 8, 7], np.uint8))
+    model.write(folder / "sparse" / "0")
+    for name in NAMES:
+        picture(folder / "images_2" / name, (6, 4))
+    scene = open_scene(str(folder), load_settings(), holdout="every:4")
+    wanted = [NAMES[i] for i in CHOSEN if i % 4]
+    indices = [scene.train.names.index(name) for name in wanted]
+    write_subset(scene, {"indices": indices}, tmp_path / "out")
+    return tmp_path / "out", set(wanted), set(scene.test.names)
+
+
+def images_of(model: Path) -> list[str]:
+    return sorted(image.name for image in pycolmap.Reconstruction(model).images.values())
+
+
+def test_splits_have_models_of_their_own(written):
+    out, chosen, test = written
+    assert set(images_of(out / "sparse" / "0")) == chosen
+    assert set(images_of(out / "test" / "sparse" / "0")) == test
+    assert set(images_of(out / "colmap" / "sparse" / "0")) == chosen | test
+    assert {path.name for path in (out / "test" / "images").iterdir()} == test
+
+
+def test_3dgs_trains_on_the_chosen_views_alone(written):
+    """readColmapSceneInfo: the images of sparse/0, all of them without --eval, and without those of test.txt where
+    llffhold is 0; with --eval alone every 8th by name is tested on."""
+    out, chosen, test = written
+    names = images_of(out / "sparse" / "0")
+    assert set(names) == chosen
+    assert all((out / "images" / name).is_file() for name in names)
+    listed = (out / "sparse" / "0" / "test.txt").read_text().split()
+    assert {name for name in names if name not in listed} == chosen
+    assert not {name for number, name in enumerate(names) if number % 8} & test
+    # render.py -s OUT/test draws the test views
+    assert set(images_of(out / "test" / "sparse" / "0")) == test
+
+
+@pytest.mark.parametrize("factor", [1, 2])
+def test_gsplat_trains_on_no_test_view(written, factor):
+    """Parser: images by name of sparse/0; the files of images/ and of images_N/ are matched in sorted order. Dataset:
+    every 8th of them validates."""
+    out, chosen, test = written
+    names = images_of(out / "sparse" / "0")
+    folders = [out / "images", out / (f"images_{factor}" if factor > 1 else "images")]
+    files, smaller = ([path.name for path in sorted(folder.iterdir())] for folder in folders)
+    assert files == smaller, "the two lists are matched one by one"
+    trained = {smaller[files.index(name)] for number, name in enumerate(names) if number % 8}
+    assert trained <= chosen
+    assert not trained & test
+
+
+@pytest.fixture(scope="module")
+def nerfstudio():
+    """Nerfstudio's reader; what it imports and does not use to read a capture is stood in for where it is missing."""
+    pytest.importorskip("nerfstudio", reason="nerfstudio is not installed (make dev installs its code alone)")
+    stood_in = {}
+    for name in ("cv2", "viser", "viser.transforms", "appdirs", "newrawpy", "torch.utils.tensorboard"):
+        try:
+            importlib.import_module(name)
+        except ImportError:
+            stood_in[name] = sys.modules[name] = MagicMock()
+    yield importlib.import_module("nerfstudio.data.dataparsers.colmap_dataparser")
+    for name in stood_in:
+        del sys.modules[name]
+
+
+def nerfstudio_split(module, data: Path, split: str, **options) -> list[str]:
+    """File names that the reader gives a split, with its default options but for the pictures' size."""
+    parser = module.ColmapDataParserConfig(data=data, downscale_factor=1, **options).setup()
+    return [Path(name).name for name in parser.get_dataparser_outputs(split).image_filenames]
+
+
+def test_nerfstudio_trains_on_all_chosen_views_and_tests_on_the_others(written, nerfstudio):
+    out, chosen, test = written
+    assert set(nerfstudio_split(nerfstudio, out, "train")) == chosen
+    assert set(nerfstudio_split(nerfstudio, out, "val")) == set(nerfstudio_split(nerfstudio, out, "test")) == test
+
+
+def test_nerfstudio_reads_the_chosen_model_too(written, nerfstudio):
+    """Pointed at sparse/0 it finds lists of views that the model does not have, and refuses: nothing leaks."""
+    out, _, _ = written
+    with pytest.raises(RuntimeError, match="were not found"):
+        nerfstudio_split(nerfstudio, out, "test", colmap_path=Path("sparse/0"))
+
+
+def test_a_capture_without_a_test_split_has_one_model(tmp_path):
+    folder = colmap(tmp_path / "in", NAMES[:6])
+    write_subset(open_scene(str(folder), load_settings()), {"indices": [4, 1]}, tmp_path / "out")
+    assert images_of(tmp_path / "out" / "sparse" / "0") == [NAMES[1], NAMES[4]]
+    assert not (tmp_path / "out" / "test").exists()
+    assert not (tmp_path / "out" / "colmap").exists()
+
+
+def test_all_points_of_the_training_views_come_along(data_root, tmp_path):
+    """As the benchmark gives them to every choice; those that only held-out views triangulated do not."""
+    scene = open_scene("hololens_space", load_settings())
+    write_subset(scene, {"indices": list(range(0, len(scene.train), 10))}, tmp_path / "out")
+    read = pycolmap.Reconstruction(tmp_path / "out" / "sparse" / "0")
+    assert read.num_points3D() == len(scene.points) < 34397
+    ours = np.sort(scene.points.xyz, axis=0)
+    np.testing.assert_array_equal(np.sort([point.xyz for point in read.points3D.values()], axis=0), ours)
