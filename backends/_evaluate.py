@@ -39,6 +39,8 @@ def evaluate(
     different (another hold-out may have trained on what is scored now), or the scene has no test split.
     """
     train = read_json(model / "train.json", "training record")
+    if not isinstance(train, dict) or not isinstance(train.get("files"), dict):
+        raise UserError(f"'{model / 'train.json'}' is not what training writes; train again")
     if not len(scene.test):
         raise UserError(f"scene '{scene.name}' has no test views; make a test split with --holdout")
     scene_hash = scene_sha256(scene)
@@ -47,6 +49,7 @@ def evaluate(
     reason = backend.available()
     if reason:
         raise UserError(f"backend '{train['backend']}' is not available: {reason}")
+    code = code_of(train["backend"], backend, scene.format)  # as it is when it is loaded
     began = time.perf_counter()
     indices = np.arange(len(scene.test))
     truth, cameras = load_images(scene.test, indices, train["width"])
@@ -85,7 +88,9 @@ def evaluate(
         "holdout": scene.holdout,
         "train_sha256": sha256_file(model / "train.json"),
         "lpips_sha256": None if weights is None else sha256_file(weights),
-        "code_sha256": code_of(train["backend"], backend, scene.format),
+        "code_sha256": code,
+        "configuration": _registry.configuration_of(backend)["render"],
+        "drawn_by": getattr(backend, "drawn_by", lambda: train["backend"])(),
         "viewbench": __version__,
     }
     write_json(out / "metrics.json", record)

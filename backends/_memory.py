@@ -9,7 +9,8 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-EVERY_S = 0.1  # between looks at the memory of a running program
+EVERY_S = 0.2  # between looks at the memory of a running program
+JOIN_S = 0.05
 WATCHER = "memory"  # the thread that looks
 GPU_EVERY_S = 1.0  # nvidia-smi takes a tenth of a second itself
 QUERY = ("nvidia-smi", "--query-compute-apps=pid,used_memory", "--format=csv,noheader,nounits")
@@ -24,11 +25,18 @@ class Usage:
 
 
 def peak_rss_bytes() -> int:
-    """Largest resident set so far of this process or of one program that it ran and waited for, in bytes."""
-    import resource
+    """Largest resident set of this process so far, in bytes.
 
-    peaks = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return int(max(peaks) * (1 if sys.platform == "darwin" else 1024))
+    Of Linux' two answers that of /proc is right: getrusage's outlives exec, so that a program which a larger one
+    started begins with that one's peak.
+    """
+    try:
+        with open("/proc/self/status", encoding="utf-8") as file:
+            return next(int(line.split()[1]) << 10 for line in file if line.startswith("VmHWM:"))
+    except (OSError, StopIteration):
+        import resource
+
+        return int(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024))
 
 
 @contextlib.contextmanager
@@ -45,7 +53,7 @@ def watched(pid: int) -> Iterator[Usage]:
         yield usage
     finally:
         done.set()
-        watcher.join()
+        watcher.join(JOIN_S)  # it may be waiting for nvidia-smi, and nobody waits for that
 
 
 def _watch(pid: int, usage: Usage, done: threading.Event) -> None:
@@ -62,7 +70,7 @@ def _watch(pid: int, usage: Usage, done: threading.Event) -> None:
                 with contextlib.suppress(psutil.Error):
                     total += process.memory_info().rss
             usage.rss_bytes = max(usage.rss_bytes, total)
-            if has_gpu and rounds % round(GPU_EVERY_S / EVERY_S) == 0:
+            if has_gpu and rounds % max(1, round(GPU_EVERY_S / EVERY_S)) == 0:
                 used = gpu_bytes({process.pid for process in family})
                 usage.gpu_bytes = max(usage.gpu_bytes or 0, used) if used is not None else usage.gpu_bytes
         rounds += 1
@@ -71,10 +79,11 @@ def _watch(pid: int, usage: Usage, done: threading.Event) -> None:
 
 
 def gpu_bytes(pids: set[int]) -> int | None:
-    """GPU memory of these processes now, in bytes; None where nvidia-smi cannot say."""
+    """GPU memory of these processes now, in bytes; None where nvidia-smi does not name them or cannot say."""
     try:
         listed = subprocess.run(QUERY, capture_output=True, text=True, timeout=10, check=True).stdout
         rows = [line.split(",") for line in listed.splitlines() if "," in line]
-        return sum(int(float(used)) << 20 for pid, used in rows if int(pid) in pids)  # it counts in MiB
+        ours = [int(float(used)) << 20 for pid, used in rows if int(pid) in pids]  # it counts in MiB
+        return sum(ours) if ours else None  # in a container it may know the processes by other numbers
     except (OSError, subprocess.SubprocessError, ValueError):
         return None

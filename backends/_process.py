@@ -38,7 +38,11 @@ def run(command: Sequence[str], folder: Path, log: Path, what: str, timeout_s: f
             raise UserError(f"{what}: '{command[0]}' cannot be run: {error.strerror or error}") from None
         try:
             with watched(process.pid) as usage:
-                status = process.wait(timeout_s)
+                try:
+                    status = process.wait(timeout_s)
+                except BaseException:
+                    _kill_group(process)  # at once, and not when the watcher has looked
+                    raise
         except subprocess.TimeoutExpired:
             raise UserError(f"{what}: stopped after {timeout_s:g} s; allow more time or less work") from None
         finally:

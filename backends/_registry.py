@@ -25,3 +25,16 @@ def load(name: str, settings: Settings) -> ModuleType | Any:
     module = plugins.load("backends", family)
     configure = getattr(module, "configured", None)
     return configure(argument, settings) if configure else module
+
+
+def configuration_of(backend: Any) -> dict[str, dict[str, Any]]:
+    """Settings of the machine that the backend's models ("train") and its renders ("render") depend on."""
+    return {"train": {}, "render": {}} | getattr(backend, "configuration", dict)()
+
+
+def version_of(backend: Any) -> str | None:
+    """The backend's version; None where what would tell it is not installed here."""
+    try:
+        return backend.version()
+    except Exception:  # a package, a program or a checkout that is not there: each backend fails in its own way
+        return None

@@ -16,7 +16,7 @@ import numpy as np
 from .. import __version__
 from ..common import plugins
 from ..common.errors import UserError, nearest
-from ..common.files import sha256_folder, write_json
+from ..common.files import read_json, sha256_folder, write_json
 from ..common.provenance import commit, machine
 from ..common.seeding import seed_of
 from ..common.settings import Settings
@@ -30,6 +30,8 @@ from ._memory import peak_rss_bytes
 from ._psnr import psnr_db
 from ._types import Budget, Probe, Report, Trained, TrainingSet
 
+OURS = ("selection.json", "train.json", "metrics.json", "renders")  # beside a model: no file of it may be called so
+LEFT = ".files.json"  # names of the model's files, for the training that replaces it
 WORK = ".training"  # a killed run's folder: the next run of the same cell takes it up or clears it
 PROBE_VIEWS = 8  # test views behind the curve; enough for its shape, few enough to cost nothing
 
@@ -58,7 +60,7 @@ def train(
     reason = backend.available()
     if reason:
         raise UserError(f"backend '{backend_name}' is not available: {reason}")
-    options = _options(backend_name, backend.CAPABILITIES.options, options or {})
+    options = all_options(backend_name, backend.CAPABILITIES.options, options or {})
     _obeyed(backend_name, backend.CAPABILITIES, budget)
     if not scene.posed:
         raise UserError(f"'{scene.name}' has no poses to train with; run structure-from-motion (COLMAP) first")
@@ -90,6 +92,7 @@ def train(
         "budget": dataclasses.asdict(budget),
         "options": options,
         "version": backend.version(),
+        "configuration": _registry.configuration_of(backend)["train"],
     }
     work = _work_folder(out, asked, resumes=backend.CAPABILITIES.resumes)
     report = Report(progress=progress, probe=_probe(scene, width) if curve and len(scene.test) else None)
@@ -102,20 +105,19 @@ def train(
         if isinstance(error, MemoryError):
             raise UserError(f"backend '{backend_name}' ran out of memory with {len(indices)} views") from None
         raise
+    taken = next((file.name for file in (work / "model").iterdir() if file.name in OURS), None)
+    if taken is not None:
+        shutil.rmtree(work, ignore_errors=True)
+        raise UserError(f"backend '{backend_name}' left a file '{taken}', a name of viewbench's own; rename it")
     record = _record(trained, asked, selection, sha256_folder(work / "model"))
-    (out / "train.json").unlink(missing_ok=True)  # of an earlier run: its model is about to go
-    for file in sorted((work / "model").iterdir()):
-        target = out / file.name
-        if target.is_dir():
-            shutil.rmtree(target)
-        file.replace(target)
+    _replace_model(work / "model", out)
     write_json(out / "selection.json", selection)
     write_json(out / "train.json", record)
     shutil.rmtree(work, ignore_errors=True)
     return record
 
 
-def _options(backend: str, known: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+def all_options(backend: str, known: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     for name, value in given.items():
         if name not in known:
             raise UserError(
@@ -164,6 +166,22 @@ def _probe(scene: Scene, width: int | None) -> Probe:
     return probe
 
 
+def _replace_model(model: Path, out: Path) -> None:
+    """Moves the files of a model to `out`, in place of all those of the one that was there."""
+    (out / "train.json").unlink(missing_ok=True)  # its model is about to go
+    names = sorted(file.name for file in model.iterdir())
+    before = read_json(out / LEFT, "list of files") if (out / LEFT).is_file() else []
+    for name in {*names, *(name for name in before if isinstance(name, str) and Path(name).name == name)}:
+        target = out / name
+        if target.is_dir() and not target.is_symlink():
+            shutil.rmtree(target)
+        else:
+            target.unlink(missing_ok=True)
+    write_json(out / LEFT, names)
+    for name in names:
+        (model / name).replace(out / name)
+
+
 def code_of(backend_name: str, format_name: str) -> str:
     """Hash of the source code that a training by this backend, on a scene read from this format, depends on."""
     return code_sha256(*modules_of(backend_name), plugins.source_name("scenes.formats", format_name))
@@ -193,7 +211,7 @@ def _record(
         "seeding": trained.seeding,
         "curve": trained.curve,
         "scene": asked["scene"],
-        **{key: asked[key] for key in ("scene_sha256", "holdout", "selection_sha256", "code_sha256")},
+        **{key: asked[key] for key in ("scene_sha256", "holdout", "selection_sha256", "code_sha256", "configuration")},
         "files": files,
         "selector": selection["selector"],
         "count": len(selection["indices"]),

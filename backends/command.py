@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..common.errors import UserError, nearest
-from ..common.files import read_json, write_json
+from ..common.files import read_json, sha256_file, write_json
 from ..common.settings import Command, Settings
+from ..scenes.image_files import is_file
 from ..scenes.types import Cameras
 from . import _process, _subset
 from ._ply_render import ply_renderer, render_ply  # no source: training does not draw
@@ -29,6 +30,7 @@ RENDER_PLACES = ("cameras", "renders", "out", "seed", "iterations", "width", "he
 OUTPUT_PLACES = ("name", "index", "out", "iterations")
 RECORD = "command.json"  # what rendering has to know of the training
 VERSION_SECONDS = 60.0
+LONGEST_NAME = 4096  # of a path; more is a script in the command line
 POINTS_OFF = "none"
 RANDOM_POINTS = 100_000  # as the 3DGS authors draw where a scene has none
 
@@ -90,7 +92,12 @@ class External:
         entry = self.entry
         train = {"train": entry.train, "format": entry.format}
         render = {"render": entry.render, "format": entry.format, "output": entry.output}
-        return {"train": train, "render": render if entry.render else {"output": entry.output, "by": ply_renderer()}}
+        render |= {"files": _hash_of_files(entry.render)}
+        return {"train": train, "render": render if entry.render else {"output": entry.output}}
+
+    def drawn_by(self) -> str:
+        """What draws its models here: it does, or one of our rasterisers does."""
+        return self._what if self.entry.render else ply_renderer()
 
     def available(self) -> str | None:
         for part, command in (("train", self.entry.train), ("render", self.entry.render)):
@@ -99,9 +106,9 @@ class External:
         return None
 
     def version(self) -> str:
-        """What its `version` command prints last, or a hash of the files that its command lines name."""
+        """What its `version` command prints last, or a hash of the files that its `train` command names."""
         if not self.entry.version:
-            return f"sha256:{_hash_of_files([*self.entry.train, *self.entry.render])}"
+            return f"sha256:{_hash_of_files(self.entry.train)}"
         with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
             log = Path(folder) / LOG
             _process.run(self.entry.version, Path(folder), log, f"{self._what} --version", VERSION_SECONDS)
@@ -238,10 +245,10 @@ def _filled(command: list[str], values: dict[str, Any]) -> list[str]:
 
 
 def _hash_of_files(command: list[str]) -> str:
-    """First 12 hex digits of the SHA-256 over the programs and scripts that a command line names."""
+    """First 12 hex digits of the SHA-256 over the programs and scripts that a command line names, in any folder."""
     digest = hashlib.sha256()
     for part in dict.fromkeys(command):
-        found = shutil.which(part) or (part if Path(part).is_file() else None)
+        found = (shutil.which(part) if len(part) < LONGEST_NAME else None) or (part if is_file(Path(part)) else None)
         if found:
-            digest.update(Path(found).read_bytes())
+            digest.update(f"{Path(part).name}\0{sha256_file(found)}\0".encode())
     return digest.hexdigest()[:12]

@@ -66,15 +66,18 @@ class InstantNgp:
         return None
 
     def version(self) -> str:
-        """The checkout's commit; a hash of the module where it is no git checkout."""
+        """The checkout's commit, where it is a git checkout, and a hash of the module that was built there."""
+        if not self.checkout:
+            raise UserError(f"instant-ngp has no version: no checkout is configured; {BUILD}")
         folder = Path(self.checkout).expanduser()
+        module = next(iter(sorted(folder.glob(_ngp_driver.PYNGP))), None)
+        built = "no module" if module is None else f"sha256:{sha256_file(module)[:12]}"
         command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=CHECK_SECONDS, check=True)
-            return f"instant-ngp {done.stdout.strip()}"
+            return f"instant-ngp {done.stdout.strip()}, {built}"
         except (OSError, subprocess.SubprocessError):
-            module = next(iter(sorted(folder.glob(_ngp_driver.PYNGP))))
-            return f"instant-ngp sha256:{sha256_file(module)[:12]}"
+            return f"instant-ngp {built}"
 
     def train(
         self, data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict[str, Any], report: Report
@@ -149,11 +152,10 @@ def _check(data: TrainingSet, options: dict[str, Any]) -> None:
     if options["samples"] < 1:
         raise UserError(f"option 'samples' is {options['samples']}, expected a positive number")
     reach = side / 2 / SCALE
-    far = np.abs(data.cameras.positions).max(axis=1)
-    if far.max() > reach:
-        name = data.names[int(far.argmax())]
+    far = np.abs(data.training.positions).max()  # of all training cameras, so that no choice fails where another goes
+    if far > reach:
         raise UserError(
-            f"camera '{name}' is {far.max():.1f} scene units from the origin, instant-ngp's box with aabb_scale={side} "
+            f"a training camera is {far:.1f} scene units from the origin, instant-ngp's box with aabb_scale={side} "
             f"ends at {reach:.1f}; set a larger aabb_scale"
         )
 

@@ -10,12 +10,14 @@ HEADLINES = {
     "worse": "is worse than {baseline} on {scenes}",
     "not told apart": "cannot be told apart from {baseline} by these seeds on {scenes}",
     "one sample": "was compared with {baseline} by a single sample on {scenes}",
+    "no spread": "was compared with {baseline} by seeds that all give the same on {scenes}",
 }
 WORDS = {
     "better": "more than the seeds explain",
     "worse": "more than the seeds explain",
     "not told apart": "no more than the seeds explain",
     "one sample": "one sample, so no interval",
+    "no spread": "the seeds give the same, so no interval",
 }
 
 
@@ -30,7 +32,8 @@ def headline(study: Study) -> list[str]:
         for backend, scene in study.panels():
             found = against(study, backend, scene, subject, baseline)
             if found is not None:
-                scenes.setdefault(found.verdict, []).append(f"{study.label(backend, scene)} ({signed(found.mean)} dB)")
+                words = f"{study.label(backend, scene)} ({_short_interval(found)})"
+                scenes.setdefault(found.verdict, []).append(words)
         parts = [
             words.format(baseline=baseline, scenes=and_list(scenes[verdict]))
             for verdict, words in HEADLINES.items()
@@ -44,7 +47,8 @@ def headline(study: Study) -> list[str]:
 def details(study: Study) -> list[str]:
     """A few sentences per scene: the subject's score, the differences with intervals, the best, the full data."""
     subject = subject_of(study)
-    return [] if subject is None else [_scene(study, backend, scene, subject) for backend, scene in study.panels()]
+    panels = [panel for panel in study.panels() if subject is not None and study.asks(panel[0], subject)]
+    return [_scene(study, backend, scene, str(subject)) for backend, scene in panels]
 
 
 def subject_of(study: Study) -> str | None:
@@ -105,6 +109,12 @@ def _at_single_ratios(study: Study, backend: str, scene: str, subject: str, base
     found = [(ratio, against(study, backend, scene, subject, baseline, (ratio,))) for ratio in ratios]
     parts = [f"{_with_interval(item)} at {percent(ratio)}" for ratio, item in found if item is not None]
     return [f"Ratio by ratio: {'; '.join(parts)}."] if parts else []
+
+
+def _short_interval(found: Difference) -> str:
+    if found.low is None or found.high is None:
+        return f"{signed(found.mean)} dB"
+    return f"{signed(found.mean)} dB, {signed(found.low)} to {signed(found.high)}"
 
 
 def _with_interval(found: Difference) -> str:

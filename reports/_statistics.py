@@ -1,8 +1,8 @@
 """Means over seeds and differences of means, with an uncertainty that does not pretend.
 
-A seed number shares no randomness between selectors (each cell draws from its own generator), so differences are
-not paired by seed: the two groups are compared by Welch's t interval. A group of one sample has no spread, and a
-difference with such a group has no interval.
+Choices with equal seed numbers share no randomness, and trainings with equal seed numbers start alike but on other
+views, so differences are not paired by seed: the two groups are compared by Welch's t interval, as independent ones. A
+group of one sample has no spread, and a difference with such a group has no interval.
 """
 
 import math
@@ -30,12 +30,13 @@ class Difference:
     mean: float
     low: float | None
     high: float | None
+    reason: str = "one sample"  # why there is no interval
 
     @property
     def verdict(self) -> str:
-        """ "better", "worse", "not told apart", or "one sample" where no interval can be given."""
+        """ "better", "worse", "not told apart", or where no interval can be given "one sample" or "no spread"."""
         if self.low is None or self.high is None:
-            return "one sample"
+            return self.reason
         return "better" if self.low > 0 else "worse" if self.high < 0 else "not told apart"
 
 
@@ -57,8 +58,8 @@ def difference(ours: Sequence[float], theirs: Sequence[float]) -> Difference:
     if a.std is None or b.std is None:
         return Difference(mean, None, None)
     va, vb = a.std**2 / a.n, b.std**2 / b.n
-    if va + vb == 0:
-        return Difference(mean, mean, mean)
+    if va + vb == 0:  # whatever repeated here repeated nothing
+        return Difference(mean, None, None, "no spread")
     from scipy.special import stdtrit
 
     freedom = (va + vb) ** 2 / (va**2 / (a.n - 1) + vb**2 / (b.n - 1))

@@ -125,6 +125,11 @@ class Study:
         """The full-data reference of the first seed that has one."""
         return next(iter(self.find(backend, scene, FULL)), None)
 
+    def asks(self, backend: str, selector: str) -> bool:
+        """Whether the part of the grid that a backend runs has this selector."""
+        found: dict[str, Any] = next((entry for entry in self.record["backends"] if entry["name"] == backend), {})
+        return selector in ((found.get("grid") or {}).get("selectors") or self.selectors)
+
     def ratios_of(self, backend: str) -> tuple[float, ...]:
         """The ratios that a backend runs, all of the study's unless the study says otherwise; ascending."""
         for entry in self.record["backends"]:

@@ -123,9 +123,9 @@ def _differences(study: Study, out: Path) -> Item | None:
     caption = (
         "Difference of mean PSNR in dB; positive means that the selector is better. In brackets: its 95 % interval. "
         "Over all ratios, each seed's PSNR is averaged over them. The seeds of the two selectors are compared by "
-        "Welch's t interval, not in pairs: choices with equal seed numbers share no randomness. “Not told apart” means "
-        "that the interval holds zero: the seeds differ among themselves by as much. By chance alone one interval in "
-        "twenty leaves it out. Nothing here says how it is on other scenes."
+        "Welch's t interval, as independent ones: choices with equal seed numbers share no randomness. “Not told "
+        "apart” means that the interval holds zero: the seeds differ among themselves by as much. By chance alone one "
+        "interval in twenty leaves it out. Nothing here says how it is on other scenes."
     )
     return Item("Differences to uniform and random choice", "table", caption, files, table)
 

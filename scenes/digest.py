@@ -21,7 +21,8 @@ def scene_sha256(scene: Scene) -> str:
     The hashes of a large scene's files are kept in the user's cache and used again for a file of the same size, times
     and inode. Raises UserError for a file that cannot be read.
     """
-    digest = hashlib.sha256(f"{scene.format}\0{scene.holdout}\0".encode())
+    assumed = scene.details.get("assumed", "")  # what a reader knows from elsewhere than the files
+    digest = hashlib.sha256(f"{scene.format}\0{scene.holdout}\0{assumed}\0".encode())
     named = [(path.name, path) for path in scene.files]
     for split in (scene.train, scene.test):
         digest.update(f"{len(split)}\0".encode())
@@ -43,7 +44,11 @@ def _hashes(paths: list[Path]) -> list[str]:
         return [sha256_file(path) for path in paths]
     # Absolute and not resolved: two links to one file are two entries, and nothing has to be looked up for them.
     names = [os.fsencode(path.absolute()).hex() for path in paths]
-    file = _cache() / f"{hashlib.sha256(chr(10).join(sorted(names)).encode()).hexdigest()[:32]}.json"
+    try:
+        cache = _cache()
+    except RuntimeError:  # nobody's home
+        return [sha256_file(path) for path in paths]
+    file = cache / f"{hashlib.sha256(chr(10).join(sorted(names)).encode()).hexdigest()[:32]}.json"
     known = _remembered(file)
     settled = time.time_ns() - SETTLED_S * 1e9
     result, fresh = [], {}

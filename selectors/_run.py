@@ -56,11 +56,12 @@ def run(
         raise UserError(f"count {count} must lie in [1, {n}]: scene '{scene.name}' has {n} training views")
     plugin = plugins.load("selectors", selector)
     selector = selector.replace("_", "-")
-    options = _options(selector, plugin.PARAMETERS, parameters or {})
+    options = all_parameters(selector, plugin.PARAMETERS, parameters or {})
     if not scene.posed:
         options = _without_poses(scene, selector, options, features)
     if options.get("sharpness") and sharpness is None:
         raise UserError(f"'{selector}' was asked to weigh sharpness, but the sharpness of the frames was not given")
+    code = code_of(selector, scene.format)  # as it is when it is loaded
     views = _views(scene.train, features, sharpness)
     begin = time.perf_counter()
     choice = plugin.select(views, count, generator("select", scene.name, selector, seed), **options)
@@ -84,8 +85,8 @@ def run(
             "similarity": similarity_s,
             "select": choice.seconds.get("select", elapsed - similarity_s),
         },
-        "features_sha256": None if views.features is None else hashlib.sha256(views.features.tobytes()).hexdigest(),
-        "code_sha256": code_of(selector, scene.format),
+        "features_sha256": None if views.features is None else features_sha256(views.features),
+        "code_sha256": code,
         "greedy": bool(getattr(plugin, "GREEDY", False)) and not options.get("sample"),
         "viewbench": __version__,
     }
@@ -148,6 +149,11 @@ def unit_rows(features: np.ndarray, names: Sequence[str]) -> np.ndarray:
     return (rows / lengths[:, None]).astype(np.float32)
 
 
+def features_sha256(rows: np.ndarray) -> str:
+    """Hex SHA-256 of features as `unit_rows` gives them."""
+    return hashlib.sha256(np.ascontiguousarray(rows, dtype=np.float32).tobytes()).hexdigest()
+
+
 def _per_frame(sharpness: np.ndarray, names: Sequence[str]) -> np.ndarray:
     values = np.asarray(sharpness, dtype=np.float64)
     if values.shape != (len(names),):
@@ -159,7 +165,7 @@ def _per_frame(sharpness: np.ndarray, names: Sequence[str]) -> np.ndarray:
     return values
 
 
-def _options(selector: str, defaults: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+def all_parameters(selector: str, defaults: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     """The defaults with what was given, each checked against the type of its default."""
     options = dict(defaults)
     for name, value in given.items():

@@ -67,7 +67,8 @@ def first_views(selection: dict[str, Any], count: int) -> dict[str, Any]:
         cut[key] = None if cut.get(key) is None else cut[key][:count]
     notes = dict(selection.get("notes") or {})
     if notes.get("below_precision_from", -1) >= count:  # nothing happened there yet
-        del notes["below_precision_from"], notes["precision"]
+        for key in ("below_precision_from", "precision"):
+            notes.pop(key, None)
     cut.pop("notes", None)
     return {**cut, "notes": notes} if notes else cut
 
@@ -82,7 +83,7 @@ def check_selection(selection: dict[str, Any], scene: Scene, scene_sha256: str) 
         indices = np.asarray(selection["indices"], dtype=np.int64)
         n_views, names = int(selection["n_views"]), list(selection["names"])
         selection["selector"], selection["seed"]
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(f"the selection lacks or garbles {error}; make it with `viewbench select`") from None
     made_on = selection.get("scene_sha256", scene_sha256)
     if made_on != scene_sha256:
@@ -95,9 +96,11 @@ def check_selection(selection: dict[str, Any], scene: Scene, scene_sha256: str) 
         raise UserError(
             f"the selection was made of {n_views} views, scene '{scene.name}' has {len(scene.train)}; select again"
         )
+    if indices.ndim != 1 or len(names) != len(indices):
+        raise UserError("the selection's indices must be a list with a name for each; select again")
     if len(indices) == 0 or indices.min() < 0 or indices.max() >= n_views or len(set(indices.tolist())) != len(indices):
         raise UserError(f"the selection's indices must be distinct and in [0, {n_views - 1}]; select again")
-    for index, name in zip(indices, names, strict=False):
+    for index, name in zip(indices, names, strict=True):
         if scene.train.names[index] != name:
             raise UserError(
                 f"the selection calls view {index} '{name}', the scene '{scene.train.names[index]}'; select again"

@@ -28,9 +28,15 @@ class Lists:
         modules: tuple[str, ...] = (),
         values: Mapping[str, Any] | None = None,
         packages: tuple[str, ...] = (),
+        keep: bool = False,
     ) -> str:
-        """The file of `step`: sources of `modules`, versions of installed `packages`, and `values` by name."""
+        """The file of `step`: sources of `modules`, versions of installed `packages`, and `values` by name.
+
+        With `keep` a file that is there stays as it is: something in it cannot be found out now.
+        """
         file = self.folder / f"{step}.txt"
+        if keep and file.is_file():
+            return str(file)
         if self.writes and step not in self._made:
             lines = [f"{sha256}  {name}" for name, sha256 in sources(*modules).items()] if modules else []
             lines += [f"{name} = {json.dumps(plain(value), sort_keys=True)}" for name, value in (values or {}).items()]

@@ -24,8 +24,8 @@ from ._study import AXES, Study
 
 # Installed packages whose version may change a step's numbers; a backend's version names its own.
 CHOOSING = ("numpy", "scipy", "numba")
-READING = ("numpy", "pillow")  # and drawing to a smaller size
-SCORING = ("numpy", "scikit-image", "pillow", "lpips")
+READING = ("numpy", "scipy", "pillow")  # and drawing to a smaller size
+SCORING = ("numpy", "scipy", "scikit-image", "pillow", "lpips", "torch")
 TIERS = (0.25, 0.5, 1.0)  # a greedy order is made up to the next of these ratios, whichever of them a study asks for
 
 
@@ -124,7 +124,7 @@ class Wiring:
         """The file with a cell's choice: one for all ratios of a tier where the order is greedy, one for all backends
         and, where the selector has no randomness, for all seeds."""
         entry = self.study.selector(wildcards.selector)
-        seed = wildcards.seed if entry.seeded else self.study.seeds[0]
+        seed = wildcards.seed if entry.seeded else 0
         ratio = float(wildcards.ratio)
         part = next(tier for tier in TIERS if ratio <= tier) if entry.greedy else ratio
         return f"{self.results}/selections/{wildcards.scene}/{wildcards.selector}/{part!r}/{seed}.json"
@@ -153,13 +153,9 @@ class Wiring:
 
     @functools.cache  # noqa: B019
     def _facts(self, name: str) -> dict[str, Any]:
-        """Version and configuration of a backend; where a version cannot be found out, the jobs will say why."""
+        """Configuration of a backend and its version, None where it cannot be found out: the jobs will say why."""
         backend = self._backend(name)
-        try:
-            version = backend.version()
-        except UserError as error:
-            version = f"unknown: {error}"
-        return {"version": version, "train": {}, "render": {}} | getattr(backend, "configuration", dict)()
+        return {"version": _registry.version_of(backend), **_registry.configuration_of(backend)}
 
     def training(self, wildcards: Any) -> str:
         """What a training depends on besides scene, selection and options."""
@@ -169,7 +165,8 @@ class Wiring:
             return self.lists.path(step)
         facts = self._facts(name)
         modules = ("workflow.commands.train", *_train.modules_of(name))
-        return self.lists.path(step, modules, {"version": facts["version"], "configuration": facts["train"]}, READING)
+        values = {"version": facts["version"], "configuration": facts["train"]}
+        return self.lists.path(step, modules, values, READING, keep=facts["version"] is None)
 
     def scoring(self, wildcards: Any) -> str:
         """What a score depends on besides scene and model."""
@@ -178,7 +175,8 @@ class Wiring:
         if not self.lists.writes:
             return self.lists.path(step)
         modules = ("workflow.commands.evaluate", *_evaluate.modules_of(name, self._backend(name)))
-        values = {"configuration": self._facts(name)["render"], "lpips": self._lpips}
+        drawn_by = getattr(self._backend(name), "drawn_by", lambda: name)()
+        values = {"configuration": self._facts(name)["render"], "drawn by": drawn_by, "lpips": self._lpips}
         return self.lists.path(step, modules, values, SCORING)
 
     @cached_property

@@ -74,7 +74,8 @@ class Gsplat:
             raise UserError(NOT_COMPILED)
 
     def version(self) -> str:
-        return f"gsplat {importlib.metadata.version('gsplat')}"
+        versions = (f"{name} {importlib.metadata.version(name)}" for name in ("gsplat", "torch"))
+        return ", ".join(versions)
 
     def train(
         self, data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict[str, Any], report: Report

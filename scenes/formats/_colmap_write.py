@@ -2,14 +2,15 @@
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
+from ...common.errors import UserError
 from ..image_files import is_file, stored_name
 from ..subset import place_image
-from ..types import Cameras, Points, Scene
+from ..types import Cameras, Points, Scene, Split
 
 FOLDERS = ("images", "images_2", "images_4", "images_8")
 TEST = "test.txt"  # beside the model: names of the images that are held out, one a line
@@ -23,47 +24,67 @@ def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
 
     COLMAP has no splits, and its readers train on what is in sparse/0 whatever else lies about. So the test views have
     a model, and a folder, of their own: test/sparse/0 and test/images. Nerfstudio wants both in one model, and finds
-    it in colmap/sparse/0 with the lists of names that it obeys: train_list.txt, val_list.txt and test_list.txt.
-    sparse/0/test.txt, the list of the 3DGS authors' reader, names the test views again (as JSON where a name has a
-    line break). Trainers that read images/ without a model find the test images there too.
+    it in colmap/sparse/0 with the lists of names that it obeys: train_list.txt, val_list.txt and test_list.txt (none
+    of it where a name has a line break, which cuts it in two there). sparse/0/test.txt, the list of the 3DGS authors'
+    reader, names the test views again (as JSON where a name has a line break).
 
     A scene that was read from COLMAP keeps its cameras, the tracks between the views written, and all points that at
     least two training views of the capture see, whichever were chosen; any other becomes a model of pinhole (or
     OpenCV) cameras, with its points but without tracks.
     """
-    train = scene.train.subset(indices)
-    if scene.format == "colmap":
-        names = {"train": list(train.names), "test": list(scene.test.names)}
-    else:
-        every, paths = [*train.names, *scene.test.names], [*train.paths, *scene.test.paths]
-        stored = [stored_name(name, path, i) for i, (name, path) in enumerate(zip(every, paths, strict=True))]
-        if all(name.startswith("images/") for name in stored):
-            stored = [name.removeprefix("images/") for name in stored]
-        names = {"train": stored[: len(train)], "test": stored[len(train) :]}
+    train, test = scene.train.subset(indices), scene.test
+    names = _stored_names(scene, train, test)
+    smaller = _smaller_folders(scene, [*names["train"], *names["test"]])
     _write_model(out, "sparse/0", scene, names, ("train",), train.cameras)
-    _place(scene, names["train"], train.paths, out, copy)
-    if not len(scene.test):
+    _place(scene, names["train"], train.paths, smaller, out, copy)
+    if not len(test):
         return
-    _place(scene, names["test"], scene.test.paths, out, copy)
-    _write_model(out / "test", "sparse/0", scene, names, ("test",), scene.test.cameras)
-    _place(scene, names["test"], scene.test.paths, out / "test", copy)
+    _place(scene, names["test"], test.paths, smaller, out, copy)
+    _write_model(out / "test", "sparse/0", scene, names, ("test",), test.cameras)
+    _place(scene, names["test"], test.paths, smaller, out / "test", copy)
     lines = [json.dumps(name) if "\n" in name else name for name in names["test"]]
     (out / "sparse" / "0" / TEST).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    if _write_model(out, "colmap/sparse/0", scene, names, ("train", "test"), train.cameras, scene.test.cameras):
+    if any(name.splitlines() != [name] for name in (*names["train"], *names["test"])):
+        return
+    if _write_model(out, BOTH_MODEL, scene, names, ("train", "test"), train.cameras, test.cameras):
         for split, key in (("train", "train"), ("val", "test"), ("test", "test")):
             text = "".join(f"{name}\n" for name in names[key])
             (out / f"{split}_list.txt").write_text(text, encoding="utf-8")
 
 
-def _place(scene: Scene, names: Sequence[str], paths: Sequence[Path], out: Path, copy: bool) -> None:
+def _stored_names(scene: Scene, train: Split, test: Split) -> dict[str, list[str]]:
+    """Names of the images of both splits in the model: COLMAP's own, or made of another format's paths."""
+    if scene.format == "colmap":
+        return {"train": list(train.names), "test": list(test.names)}
+    every, paths = [*train.names, *test.names], [*train.paths, *test.paths]
+    stored = [stored_name(name, path, i) for i, (name, path) in enumerate(zip(every, paths, strict=True))]
+    stored = [PurePosixPath(name).as_posix() for name in stored]  # "./train/r_0.png" is no name to a reader of COLMAP
+    if all(name.startswith("images/") for name in stored):
+        stored = [name.removeprefix("images/") for name in stored]
+    return {"train": stored[: len(train)], "test": stored[len(train) :]}
+
+
+def _images_folder(scene: Scene) -> Path:
+    return scene.details["images"] if scene.format == "colmap" else scene.root / "images"
+
+
+def _smaller_folders(scene: Scene, names: Sequence[str]) -> list[str]:
+    """Folders of smaller pictures that have all of them. In one with gaps every later picture would be another's:
+    gsplat matches the sorted files of two folders one by one."""
+    if scene.format != "colmap":
+        return []
+    others = [name for name in FOLDERS if name != _images_folder(scene).name]
+    return [other for other in others if all(is_file(scene.root / other / name) for name in names)]
+
+
+def _place(
+    scene: Scene, names: Sequence[str], paths: Sequence[Path], smaller: Sequence[str], out: Path, copy: bool
+) -> None:
     """Images under the names of the model; smaller ones too, where the capture has them."""
-    read = scene.details["images"] if scene.format == "colmap" else scene.root / "images"
     for name, path in zip(names, paths, strict=True):
-        place_image(path, out / read.name / name, copy)
-        if scene.format == "colmap":
-            for other in FOLDERS:
-                if other != read.name and is_file(scene.root / other / name):
-                    place_image(scene.root / other / name, out / other / name, copy)
+        place_image(path, out / _images_folder(scene).name / name, copy)
+        for folder in smaller:
+            place_image(path.parents[len(PurePosixPath(name).parts)] / folder / name, out / folder / name, copy)
 
 
 def _write_model(
@@ -76,6 +97,11 @@ def _write_model(
         if source is None:
             return False
         model = _reduced(source, wanted, scene.points)
+        have = {image.name for image in model.images.values() if image.has_pose}
+        if have != set(wanted):  # never half of what was asked for
+            raise UserError(
+                f"COLMAP model '{source}' has {len(have)} of the {len(wanted)} images to be written to {place}"
+            )
     else:
         model = _new_model(scene, cameras, wanted)
     (out / place).mkdir(parents=True)
@@ -88,27 +114,54 @@ def _reduced(source: Path, wanted: Sequence[str], points: Points | None) -> Any:
     import pycolmap
 
     model, kept = pycolmap.Reconstruction(source), set(wanted)
+    whole = {frame_id: {model.images[i.id].name for i in frame.data_ids} for frame_id, frame in model.frames.items()}
+    if any(names & kept and not names <= kept for names in whole.values()):
+        model = _without_rigs(model, kept)  # a frame goes or stays with all of its cameras
     for image in list(model.images.values()):
         if image.name not in kept and image.has_pose:
             model.deregister_frame(image.frame_id)
-    if points is None:
-        for point_id in list(model.points3D):
-            model.delete_point3D(point_id)
-        return model
-    missing: dict[tuple[float, ...], list[np.ndarray]] = {}  # colours by place: two points may lie in one
-    for xyz, rgb in zip(points.xyz.tolist(), points.rgb, strict=True):
-        missing.setdefault(tuple(xyz), []).append(rgb)
+    missing: dict[tuple, int] = {}  # how many points lie in one place with one colour
+    for key in _keys(points):
+        missing[key] = missing.get(key, 0) + 1
     for point_id, point in list(model.points3D.items()):
         seen_by = {element.image_id for element in point.track.elements}
-        here = missing.get(tuple(point.xyz.tolist()))
-        if here and len(seen_by) >= LEAST_TRACK:
-            here.pop()
+        key = (*point.xyz.tolist(), *point.color.tolist())
+        if missing.get(key) and len(seen_by) >= LEAST_TRACK:
+            missing[key] -= 1
         else:
             model.delete_point3D(point_id)  # its track is gone, or the training views do not know it
-    for place, colours in missing.items():
-        for rgb in colours:
-            model.add_point3D(np.array(place), pycolmap.Track(), rgb)
+    for key, count in missing.items():
+        for _ in range(count):
+            model.add_point3D(np.array(key[:3]), pycolmap.Track(), np.array(key[3:], np.uint8))
     return model
+
+
+def _keys(points: Points | None) -> list[tuple]:
+    if points is None:
+        return []
+    return [(*xyz, *rgb) for xyz, rgb in zip(points.xyz.tolist(), points.rgb.tolist(), strict=True)]
+
+
+def _without_rigs(model: Any, kept: set[str]) -> Any:
+    """The images `kept` of the model with a pose each of its own, and the tracks between them."""
+    import pycolmap
+
+    made = pycolmap.Reconstruction()
+    for camera in model.cameras.values():
+        made.add_camera_with_trivial_rig(camera)
+    for image_id, image in model.images.items():
+        if image.name in kept and image.has_pose:
+            seen = [pycolmap.Point2D(point.xy) for point in image.points2D]
+            alone = pycolmap.Image(name=image.name, camera_id=image.camera_id, image_id=image_id)
+            alone.points2D = pycolmap.Point2DList(seen)
+            made.add_image_with_trivial_frame(alone, image.cam_from_world())
+    for point in model.points3D.values():
+        track = pycolmap.Track()
+        for element in point.track.elements:
+            if element.image_id in made.images:
+                track.add_element(element.image_id, element.point2D_idx)
+        made.add_point3D(point.xyz, track, point.color)
+    return made
 
 
 def _new_model(scene: Scene, groups: Sequence[Cameras], names: Sequence[str]) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import UserError
-from ..image_files import image_size, leaves
+from ..image_files import image_size, is_file, leaves
 from ..splits import training_points
 from ..types import OPENCV, Cameras, Points, Scene, Split
 from . import _colmap_files
@@ -19,6 +19,7 @@ __all__ = ["WRITABLE", "detect", "read", "write"]
 
 WRITABLE = True
 MODELS = ("sparse/0", "sparse", "sparse_txt", "colmap/sparse/0", ".")
+REQUIRED = ("cameras", "images", "points3D")  # files of a model
 BOUNDS = "poses_bounds.npy"
 # How many of k1, k2, p1, p2, k3 stand behind the focal lengths and the centre in a camera's parameters.
 LENSES = {"SIMPLE_PINHOLE": 0, "PINHOLE": 0, "SIMPLE_RADIAL": 1, "RADIAL": 2, "OPENCV": 4, "FULL_OPENCV": 5}
@@ -33,11 +34,7 @@ def detect(root: Path) -> str | None:
 
 
 def _model(root: Path) -> Path | None:
-    for folder in MODELS:
-        for suffix in ("bin", "txt"):
-            if all((root / folder / f"{name}.{suffix}").is_file() for name in ("cameras", "images", "points3D")):
-                return root / folder
-    return None
+    return next((root / folder for folder in MODELS if _is_model(root / folder)), None)
 
 
 def read(root: Path) -> Scene:
@@ -54,8 +51,9 @@ def read(root: Path) -> Scene:
     every, points = _split(reconstruction, images, folder), _points(reconstruction, images)
     files, notes = [model], list(_others(model))
     details: dict[str, Any] = {"images": folder}
-    if _is_model(root / TEST_MODEL):
-        _, test_images = test = _registered(root / TEST_MODEL)
+    test = _test_model(root, model)
+    if test is not None:
+        test_images = test[1]
         kept = np.arange(len(images))
         held_split = _split(*test, folder=root / TEST_MODEL.split("/")[0] / folder.name)
         files.append(root / TEST_MODEL)
@@ -66,7 +64,8 @@ def read(root: Path) -> Scene:
         }:
             details["models"]["train+test"] = both
     else:
-        held = _held_out(model, every.names)
+        held, unknown = _held_out(model, every.names)
+        notes += unknown
         kept, held_split = np.setdiff1d(np.arange(len(images)), held), every.subset(held)
         details["models"] = dict.fromkeys(("train", "test", "train+test"), model)
     points, left_out = training_points(points, kept, len(images))
@@ -82,15 +81,31 @@ def read(root: Path) -> Scene:
         train=every.subset(kept),
         test=held_split,
         points=points,
-        files=tuple(sorted(p for folder in files for p in folder.iterdir() if p.suffix in (".bin", ".txt"))),
+        files=tuple(path for folder in files for path in _files(folder)),
         notes=(*notes, *left_out),
         details=details,
     )
 
 
+def _files(model: Path) -> list[Path]:
+    """What a model was read from."""
+    names = [f"{name}.{suffix}" for name in (*REQUIRED, "rigs", "frames") for suffix in ("bin", "txt")]
+    return sorted(model / name for name in (*names, TEST) if is_file(model / name))
+
+
+def _test_model(root: Path, model: Path) -> tuple[Any, list[Any]] | None:
+    """The test views' own model that viewbench writes; any other folder test/ is none of ours.
+
+    It is known by the list beside the training model, which names just its images.
+    """
+    if not _is_model(root / TEST_MODEL) or (root / TEST_MODEL) == model or not (model / TEST).is_file():
+        return None
+    found = _registered(root / TEST_MODEL)
+    return found if {image.name for image in found[1]} == set(_listed(model / TEST)) else None
+
+
 def _is_model(folder: Path) -> bool:
-    names = ("cameras", "images", "points3D")
-    return any(all((folder / f"{name}.{suffix}").is_file() for name in names) for suffix in ("bin", "txt"))
+    return any(all((folder / f"{name}.{suffix}").is_file() for name in REQUIRED) for suffix in ("bin", "txt"))
 
 
 def _registered(model: Path) -> tuple[Any, list[Any]]:
@@ -146,21 +161,39 @@ def _others(model: Path) -> tuple[str, ...]:
     return (f"{len(models)} models in {model.parent.name}/; only the first is read",) if len(models) > 1 else ()
 
 
-def _held_out(model: Path, names: tuple[str, ...]) -> np.ndarray:
-    """Indices of the images that test.txt beside the model names. Raises UserError for a name that is not there."""
-    if not (model / TEST).is_file():
-        return np.zeros(0, dtype=np.int64)
+def _listed(file: Path) -> list[str]:
+    """Names in test.txt; one with a line break is written as JSON."""
     try:
-        listed = [line for line in (model / TEST).read_text(encoding="utf-8").split("\n") if line]
+        lines = [line for line in file.read_text(encoding="utf-8").split("\n") if line.strip()]
     except UnicodeDecodeError:
-        raise UserError(f"'{model / TEST}' is no text file of image names") from None
+        raise UserError(f"'{file}' is no text file of image names") from None
+    return [_unquoted(line) for line in lines]
+
+
+def _unquoted(line: str) -> str:
+    """The name that a line stands for: only a line that is the JSON of a name with a line break is read as JSON."""
+    try:
+        name = json.loads(line) if line.startswith('"') else line
+    except ValueError:
+        return line
+    return name if isinstance(name, str) and "\n" in name else line
+
+
+def _held_out(model: Path, names: tuple[str, ...]) -> tuple[np.ndarray, list[str]]:
+    """Indices of the images that test.txt beside the model names, and a note of those that the model does not have.
+
+    Raises UserError where it has none of them.
+    """
+    file = model / TEST
+    if not file.is_file():
+        return np.zeros(0, dtype=np.int64), []
     index = {name: i for i, name in enumerate(names)}
-    # A name with a line break is written as JSON; no other name is looked up so.
-    index |= {json.dumps(name): i for i, name in enumerate(names) if "\n" in name}
+    listed = [name if name in index else name.strip() for name in _listed(file)]
     unknown = [name for name in listed if name not in index]
-    if unknown:
-        raise UserError(f"'{model / TEST}' names image '{unknown[0]}', which the model does not have")
-    return np.array(sorted({index[name] for name in listed}), dtype=np.int64)
+    if unknown and len(unknown) == len(listed):
+        raise UserError(f"'{file}' names image '{unknown[0]}', which the model does not have, and no other")
+    notes = [f"{len(unknown)} of {len(listed)} names in {TEST} are of no image that has a pose"] if unknown else []
+    return np.array(sorted({index[name] for name in listed if name in index}), dtype=np.int64), notes
 
 
 def _intrinsics(camera: Any) -> list[float]:

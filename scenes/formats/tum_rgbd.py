@@ -60,6 +60,7 @@ def read(root: Path) -> Scene:
         train=train,
         test=train.subset([]),
         files=(root / "rgb.txt", root / "groundtruth.txt", *camera),
+        details={"assumed": repr(values)},
         notes=(f"{lost} of {len(paths)} frames dropped: no pose within {FARTHEST_S} s",) if lost else (),
     )
 

@@ -76,11 +76,13 @@ def test_boxes_that_it_does_not_know_are_refused(checkout, take_views, tmp_path,
 
 
 def test_cameras_outside_the_box_are_refused(checkout, take_views, tmp_path):
+    """Of all training cameras, so that no choice of views fails where another goes."""
     views = take_views()
-    moved = views.cameras.c2w.copy()
-    moved[1, 0, 3] = 7.0
-    with pytest.raises(UserError, match=r"camera 'train/0130\.jpg' is 7\.0 scene units .* set a larger aabb_scale"):
-        train(load(checkout), replace(views, cameras=replace(views.cameras, c2w=moved)), tmp_path / "m")
+    moved = views.training.c2w.copy()
+    moved[77, 0, 3] = 7.0
+    assert 77 not in views.chosen
+    with pytest.raises(UserError, match=r"a training camera is 7\.0 scene units .* set a larger aabb_scale"):
+        train(load(checkout), replace(views, training=replace(views.training, c2w=moved)), tmp_path / "m")
 
 
 def test_its_failure_is_one_sentence(checkout, take_views, tmp_path):
@@ -107,7 +109,15 @@ def test_the_commit_is_recorded(checkout):
     for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "x"]):
         subprocess.run([*git, *command], check=True)
     done = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True)
-    assert load(checkout).version() == f"instant-ngp {done.stdout[:12]}"
+    first = load(checkout).version()
+    assert first.startswith(f"instant-ngp {done.stdout[:12]}, sha256:")
+    module = checkout / "build" / "pyngp.py"
+    module.write_text(module.read_text() + "# built again\n")
+    rebuilt = load(checkout).version()
+    module.write_text(module.read_text() + "# and again\n")
+    assert len({first, rebuilt, load(checkout).version()}) == 3, "a dirty checkout is not all that was built"
+    with pytest.raises(UserError, match="no checkout is configured"):
+        load().version()
 
 
 def test_the_driver_needs_nothing_of_viewbench(checkout):

@@ -3,9 +3,11 @@
 import dataclasses
 import json
 import shutil
+import sys
 
 import pytest
 
+from tests.backends.conftest import nearest_command, settings_with
 from viewbench.backends import _evaluate, _train
 from viewbench.backends._types import Budget
 from viewbench.common.errors import UserError
@@ -97,6 +99,27 @@ def test_another_choice_of_as_many_views_is_another_run(small_room, tmp_path):
     arguments = {"settings": SETTINGS, "seed": 0, "budget": Budget(4), "width": 48, "curve": False}
     second = _train.train(scene, other, "splat", tmp_path / "b", **arguments)
     assert first["selection_sha256"] != second["selection_sha256"]
+
+
+def test_nothing_of_an_older_model_is_left_to_be_drawn(small_room, tmp_path):
+    """A program that wrote cloud.ply writes renamed.ply now: the old one goes, whoever removed train.json meanwhile."""
+    scene = open_scene(str(small_room), SETTINGS)
+    chosen = _run.run(scene, "uniform", 3, 0)
+
+    def train(file):
+        code = f"import sys, pathlib; pathlib.Path(sys.argv[1], 'deep').mkdir(); open(sys.argv[1] + '/{file}', 'w')"
+        command = nearest_command(train=[sys.executable, "-c", code, "{out}", "{iterations}"])
+        asked = {"settings": settings_with(x=command), "seed": 0, "budget": Budget(4), "width": 48}
+        return _train.train(scene, chosen, "command:x", tmp_path, curve=False, **asked)
+
+    train("cloud.ply")
+    (tmp_path / "mine.txt").write_text("of the user's own")
+    (tmp_path / "train.json").unlink()
+    assert "renamed.ply" in train("renamed.ply")["files"]
+    assert not (tmp_path / "cloud.ply").exists()
+    assert (tmp_path / "mine.txt").exists()
+    with pytest.raises(UserError, match=r"left a file 'metrics\.json', a name of viewbench's own"):
+        train("metrics.json")
 
 
 def test_a_folder_is_hashed_file_by_file(tmp_path):

@@ -27,6 +27,8 @@ def make_study(
     seeds=(0, 1, 2),
     backends=("splat",),
     reference=True,
+    grids=None,
+    everything_repeats=False,
     lpips=False,
     truth=True,
     failed=(),
@@ -35,11 +37,16 @@ def make_study(
 ):
     """Writes results/NAME under `root` and returns it.
 
-    `failed` holds (backend, scene, selector, ratio, seed) of cells without files; a None in it matches anything.
+    `grids` holds, by backend, the part of the grid that it runs. With `everything_repeats` coverage and the full-data
+    reference have every seed, else one. `failed` holds (backend, scene, selector, ratio, seed) of cells without files;
+    a None in it matches anything.
     """
     folder = Path(root) / "results" / name
     folder.mkdir(parents=True)
-    _write(folder / "study.json", _study(name, title, scenes, selectors, ratios, seeds, backends, reference, reports))
+    _write(
+        folder / "study.json",
+        _study(name, title, scenes, selectors, ratios, seeds, backends, reference, reports, grids or {}),
+    )
     rows = []
     for scene in scenes:
         cameras = _scene(folder, scene, truth, test_names)
@@ -47,10 +54,10 @@ def make_study(
             grid = [
                 (selector, ratio, seed)
                 for selector in selectors
-                for ratio in ratios
-                for seed in (seeds[:1] if selector == "coverage" else seeds)
+                for ratio in (grids or {}).get(backend, {}).get("ratios", ratios)
+                for seed in (seeds[:1] if selector == "coverage" and not everything_repeats else seeds)
             ]
-            grid += [("full", 1.0, 0)] if reference else []
+            grid += [("full", 1.0, seed) for seed in (seeds if everything_repeats else (0,))] if reference else []
             for selector, ratio, seed in grid:
                 broken = any(
                     all(
@@ -68,7 +75,7 @@ def make_study(
     return folder
 
 
-def _study(name, title, scenes, selectors, ratios, seeds, backends, reference, reports):
+def _study(name, title, scenes, selectors, ratios, seeds, backends, reference, reports, grids):
     return {
         "schema": 1,
         "name": name,
@@ -79,7 +86,15 @@ def _study(name, title, scenes, selectors, ratios, seeds, backends, reference, r
         "ratios": ratios,
         "seeds": seeds,
         "backends": [
-            {"name": b, "backend": b, "iterations": 1500, "seconds": None, "width": 128, "options": {}}
+            {
+                "name": b,
+                "backend": b,
+                "iterations": 1500,
+                "seconds": None,
+                "width": 128,
+                "options": {},
+                "grid": grids.get(b, {}),
+            }
             for b in backends
         ],
         "reference": reference,

@@ -3,11 +3,13 @@
 import re
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
 from viewbench.common import plugins
 from viewbench.common.errors import UserError
 from viewbench.reports import _findings, _run, _study
+from viewbench.reports._statistics import signed
 
 from .fixtures import make_study
 
@@ -112,6 +114,44 @@ def test_findings_follow_the_numbers(folder):
     assert "Its mean is the highest" in details[0]
     full = study.full("splat", "room_human")
     assert f"all {full.count} views ({full.psnr_db:.2f} dB)" in details[0]
+
+
+def test_every_difference_carries_its_interval(tmp_path):
+    """On all ratios, on each, and to the models of all views; by scipy's Welch test for comparison."""
+    from scipy.stats import ttest_ind
+
+    study = _study.load(make_study(tmp_path, scenes=("room_human",), seeds=(3, 5, 8, 9), everything_repeats=True))
+
+    def expected(ours, theirs):
+        bounds = ttest_ind(ours, theirs, equal_var=False).confidence_interval(0.95)
+        mean = sum(ours) / len(ours) - sum(theirs) / len(theirs)
+        return f"{signed(mean)} dB (95 % interval {signed(bounds.low)} to {signed(bounds.high)})"
+
+    def scores(selector, ratio):
+        return [cell.psnr_db for cell in study.find(selector=selector, ratio=ratio)]
+
+    (details,) = _findings.details(study)
+    for ratio in study.ratios:
+        at = expected(scores("maxmin", ratio), scores("uniform", ratio))
+        assert f"{at} at {ratio * 100:g} %" in details
+    gap = expected(scores("maxmin", 0.2), scores("full", 1.0))
+    assert f"4 models trained on all 400 views ({np.mean(scores('full', 1.0)):.2f} dB) is {gap}." in details
+    over = [np.mean([scores(name, ratio) for ratio in study.ratios], axis=0).tolist() for name in ("maxmin", "uniform")]
+    assert expected(*over).split(" (95 % interval ")[1].rstrip(")") in _findings.headline(study)[0]
+
+
+def test_a_backend_with_a_part_of_the_ratios_is_judged_by_them(tmp_path):
+    part = {"some": {"ratios": [0.05, 0.2]}}
+    folder = make_study(tmp_path, scenes=("room_human",), backends=("splat", "some"), grids=part)
+    study = _study.load(folder)
+    assert (study.ratios_of("splat"), study.ratios_of("some")) == ((0.05, 0.1, 0.2), (0.05, 0.2))
+    whole, some = _findings.details(study)
+    assert "over the ratios 5 %, 10 % and 20 %" in whole
+    assert "over the ratios 5 % and 20 %" in some
+    for name in study.record["reports"]:
+        _run.run(folder, name)
+    _run.page(folder)
+    assert (folder / "reports" / "renders_room_human_some.png").is_file()
 
 
 def test_a_study_without_maxmin_is_told_about_its_best(tmp_path):

@@ -13,10 +13,13 @@ import numpy as np
 import pycolmap
 import pytest
 
+from tests.scenes.test_transforms import frames, write
 from tests.scenes.test_written import colmap, picture
+from viewbench.common.errors import UserError
 from viewbench.common.settings import load as load_settings
+from viewbench.scenes.digest import scene_sha256
 from viewbench.scenes.load import open_scene
-from viewbench.scenes.subset import write_subset
+from viewbench.scenes.subset import write_scene, write_subset
 
 NAMES = [f"frame{number:02d}.png" for number in range(24)]
 CHOSEN = [20, 3, 7, 11, 15]  # in the order chosen
@@ -111,6 +114,115 @@ def test_nerfstudio_reads_the_chosen_model_too(written, nerfstudio):
     out, _, _ = written
     with pytest.raises(RuntimeError, match="were not found"):
         nerfstudio_split(nerfstudio, out, "test", colmap_path=Path("sparse/0"))
+
+
+def rig(folder):
+    """Twelve frames of a rig of two cameras, and points that pairs of images see."""
+    model = pycolmap.Reconstruction()
+    sensors = []
+    made = pycolmap.Rig(rig_id=1)
+    for number in (1, 2):
+        model.add_camera(pycolmap.Camera(camera_id=number, model="PINHOLE", width=12, height=8, params=[10, 10, 6, 4]))
+        sensors.append(pycolmap.sensor_t(pycolmap.SensorType.CAMERA, number))
+    made.add_ref_sensor(sensors[0])
+    aside = pycolmap.Rigid3d(pycolmap.Rotation3d(np.array([0, 0, 0, 1.0])), np.array([-0.1, 0, 0]))
+    made.add_sensor(sensors[1], aside)
+    model.add_rig(made)
+    for number in range(12):
+        frame = pycolmap.Frame(frame_id=number + 1, rig_id=1)
+        frame.rig_from_world = pycolmap.Rigid3d(
+            pycolmap.Rotation3d(np.array([0, 0, 0, 1.0])), np.array([-float(number), 0, 0])
+        )
+        images = [
+            pycolmap.Image(name=f"{side}/{number:02d}.png", camera_id=camera, image_id=2 * number + camera)
+            for camera, side in ((1, "left"), (2, "right"))
+        ]
+        for image in images:
+            image.points2D = pycolmap.Point2DList([pycolmap.Point2D(np.array([6.0, 4.0]))])
+            image.frame_id = frame.frame_id
+            frame.add_data_id(image.data_id)
+        model.add_frame(frame)
+        for image in images:
+            model.add_image(image)
+        model.register_frame(frame.frame_id)
+    for first in range(1, 23):
+        track = pycolmap.Track()
+        for image_id in (first, first + 1):
+            if not model.images[image_id].points2D[0].has_point3D():
+                track.add_element(image_id, 0)
+        if track.length() == 2:
+            model.add_point3D(np.array([first, 0.0, 5.0]), track, np.array([first, 0, 0], np.uint8))
+    (folder / "sparse" / "0").mkdir(parents=True)
+    model.write(folder / "sparse" / "0")
+    for image in model.images.values():
+        picture(folder / "images" / image.name, (12, 8))
+    return folder
+
+
+@pytest.mark.parametrize("indices", [[0, 5, 17], [3], list(range(18))])
+def test_of_a_rig_the_chosen_images_stay_and_their_siblings_go(tmp_path, indices):
+    scene = open_scene(str(rig(tmp_path / "in")), load_settings(), holdout="every:4")
+    assert (len(scene.train), len(scene.test)) == (18, 6)
+    write_subset(scene, {"indices": indices}, tmp_path / "out")
+    chosen, test = {scene.train.names[i] for i in indices}, set(scene.test.names)
+    for place, names in {"sparse/0": chosen, "test/sparse/0": test, "colmap/sparse/0": chosen | test}.items():
+        assert set(images_of(tmp_path / "out" / place)) == names, place
+    again = open_scene(str(tmp_path / "out"), load_settings())
+    assert (set(again.train.names), set(again.test.names)) == (chosen, test)
+    for split, old in ((again.train, scene.train), (again.test, scene.test)):
+        order = [old.names.index(name) for name in split.names]
+        np.testing.assert_allclose(split.cameras.c2w, old.cameras.c2w[order], atol=1e-12)
+
+
+def test_a_folder_of_smaller_pictures_with_gaps_is_left_out(tmp_path):
+    """gsplat would match every picture behind the gap to another one's camera, test views among them."""
+    folder = colmap(tmp_path / "in", NAMES)
+    for name in NAMES[:5] + NAMES[6:]:
+        picture(folder / "images_2" / name, (6, 4))
+    scene = open_scene(str(folder), load_settings(), holdout="every:4")
+    write_subset(scene, {"indices": list(range(len(scene.train)))}, tmp_path / "out")
+    assert not list((tmp_path / "out").rglob("images_2"))
+
+
+def test_a_name_that_nerfstudio_would_cut_in_two_gets_no_list(tmp_path):
+    folder = colmap(tmp_path / "in", ["a.png", "b.png", "a.png\nb.png", "c.png"])
+    (folder / "sparse" / "0" / "test.txt").write_text("b.png\n")
+    scene = open_scene(str(folder), load_settings())
+    assert scene.test.names == ("b.png",)
+    write_subset(scene, {"indices": [0, 1, 2]}, tmp_path / "out")
+    assert not list((tmp_path / "out").glob("*_list.txt"))
+    assert not (tmp_path / "out" / "colmap").exists()
+    assert open_scene(str(tmp_path / "out"), load_settings()).test.names == ("b.png",)
+
+
+def test_names_of_another_format_are_plain(tmp_path):
+    """Nerfstudio's and Blender's "./images/a.png" is no name to a reader of COLMAP."""
+    folder = write(tmp_path / "in", frames("./images/a.png", "./images/b.png"), fl_x=5)
+    write_scene(open_scene(str(folder), load_settings()), np.arange(2), tmp_path / "out", "colmap")
+    assert images_of(tmp_path / "out" / "sparse" / "0") == ["a.png", "b.png"]
+    assert sorted(path.name for path in (tmp_path / "out" / "images").iterdir()) == ["a.png", "b.png"]
+
+
+def test_what_lies_beside_a_model_does_not_matter(tmp_path):
+    folder = colmap(tmp_path / "in", NAMES[:5])
+    before = scene_sha256(open_scene(str(folder), load_settings()))
+    (folder / "sparse" / "0" / "old.txt").symlink_to("nowhere")
+    (folder / "sparse" / "0" / "notes.txt").mkdir()
+    colmap(folder / "test", NAMES[:3])
+    scene = open_scene(str(folder), load_settings())
+    assert (len(scene.train), len(scene.test)) == (5, 0), "a folder test/ that nobody lists is somebody else's"
+    assert scene_sha256(scene) == before
+
+
+def test_a_list_may_have_blanks_and_names_that_were_never_registered(tmp_path):
+    folder = colmap(tmp_path / "in", NAMES[:5])
+    (folder / "sparse" / "0" / "test.txt").write_text(f"{NAMES[1]} \nlost.png\n\n")
+    scene = open_scene(str(folder), load_settings())
+    assert scene.test.names == (NAMES[1],)
+    assert scene.notes == ("1 of 2 names in test.txt are of no image that has a pose",)
+    (folder / "sparse" / "0" / "test.txt").write_text("lost.png\n")
+    with pytest.raises(UserError, match="names image 'lost.png', which the model does not have"):
+        open_scene(str(folder), load_settings())
 
 
 def test_a_capture_without_a_test_split_has_one_model(tmp_path):

@@ -196,6 +196,15 @@ def test_a_selection_of_another_version_of_the_scene_is_refused():
     assert check_selection(record, SCENE, record["scene_sha256"]).tolist() == record["indices"]
     with pytest.raises(UserError, match=r"with holdout 'given' and hash .*; select again"):
         check_selection(record, SCENE, "0" * 64)
+    for broken in (
+        {"indices": [[0, 1]]},
+        {"indices": [float("inf")]},
+        {"indices": [10**30]},
+        {"names": []},
+        {"names": 3},
+    ):
+        with pytest.raises(UserError, match="select again|viewbench select"):
+            check_selection({**record, **broken}, SCENE, record["scene_sha256"])
     by_hand = {key: record[key] for key in ("selector", "seed", "n_views", "indices", "names")}
     assert check_selection(by_hand, SCENE, "0" * 64).tolist() == record["indices"]
 

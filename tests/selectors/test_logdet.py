@@ -7,7 +7,10 @@ import pytest
 
 from tests.selectors import slow
 from viewbench.common.errors import UserError
-from viewbench.selectors import _kdpp, logdet
+from viewbench.common.settings import load as load_settings
+from viewbench.scenes.load import open_scene
+from viewbench.selectors import _kdpp, _run, logdet
+from viewbench.selectors._normalise import normalise
 from viewbench.selectors._types import Views
 
 
@@ -74,3 +77,19 @@ def test_sample_of_nearly_equal_views_is_distinct():
     choice = logdet.select(close, 50, np.random.default_rng(0), factors=["pos"], sample=True)
     assert sorted(choice.indices) == list(range(50))
     assert 3 <= choice.notes["below_precision_from"] < 50
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sample_is_less_spread_out_than_the_greedy_choice(seed):
+    """Which is why the published z_DPP, a sample, says little of the greedy maximiser: on the room's own path."""
+    scene = open_scene("room_human", load_settings())
+    places = normalise(scene.train.cameras.positions)
+
+    def apart(sample):
+        """Mean distance of the nearest pairs among 20 views, positions in [-4, 4]."""
+        parameters = {"factors": ["pos", "ang"], "sample": sample}
+        chosen = places[_run.run(scene, "logdet", 20, seed, parameters)["indices"]]
+        away = np.linalg.norm(chosen[:, None] - chosen, axis=2)
+        return (away + 99 * np.eye(20)).min(axis=1).mean()
+
+    assert apart(sample=True) < 0.95 * apart(sample=False)

@@ -90,11 +90,15 @@ def test_what_a_failure_left_behind_is_never_ok(clone):
     assert clone.snakemake().returncode != 0
     assert (cell(clone) / "metrics.json").is_file()
     for row in rows(clone).values():
-        assert (row["psnr_db"], "is by other code" in row["status"]) == ("", True), row["status"]
+        assert (row["psnr_db"], "another code_sha256" in row["status"]) == ("", True), row["status"]
 
 
 def test_a_file_of_another_cell_is_found(clone):
-    for name, words in {"train.json": "of another selection", "selection.json": "by another selector"}.items():
+    wrong = {
+        "train.json": "another selection_sha256; delete train.json there",
+        "selection.json": "another selector; delete selection.json there",
+    }
+    for name, words in wrong.items():
         other = clone.copied(clone.folder.parent / name)
         (cell(other) / name).write_bytes((cell(other, "uniform") / name).read_bytes())
         done = other.call("viewbench", "collect", "mini")

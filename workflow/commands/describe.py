@@ -15,7 +15,10 @@ SAMPLE = 5000  # points kept for the figures
 @click.option("--width", type=click.IntRange(min=16), help="Also write the test images at this width beside it.")
 @_options.format_option
 @_options.holdout_option
-def command(scene: str, out: Path, width: int | None, format_: str | None, holdout: str | None) -> None:
+@_options.outside_option
+def command(
+    scene: str, out: Path, width: int | None, format_: str | None, holdout: str | None, allow_outside: bool
+) -> None:
     """Write positions and viewing directions of both splits of SCENE as JSON."""
     import numpy as np
 
@@ -26,7 +29,7 @@ def command(scene: str, out: Path, width: int | None, format_: str | None, holdo
     from ...scenes.types import Split
 
     settings = settings_file.load()
-    opened = open_scene(scene, settings, format=format_, holdout=holdout)
+    opened = open_scene(scene, settings, format=format_, holdout=holdout, allow_outside=allow_outside)
     entry = settings.scenes.get(scene)
 
     def split(part: Split) -> dict:

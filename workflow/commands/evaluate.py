@@ -13,13 +13,14 @@ from . import _options
 @_options.out_option
 @_options.format_option
 @_options.holdout_option
-def command(model: Path, scene: str, out: Path, format_: str | None, holdout: str | None) -> None:
+@_options.outside_option
+def command(model: Path, scene: str, out: Path, format_: str | None, holdout: str | None, allow_outside: bool) -> None:
     """Render the test views of SCENE with the model in the folder MODEL; write metrics.json and the renders."""
     from ...backends._evaluate import evaluate
     from ...common import settings as settings_file
 
     settings = settings_file.load()
-    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout)
+    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout, allow_outside=allow_outside)
     record = evaluate(model, opened, out, settings=settings, progress=_options.progress("evaluate"))
     text = [f"{len(record['views'])} test views"]
     for metric, unit in (("psnr_db", " dB PSNR"), ("ssim", " SSIM"), ("lpips", " LPIPS")):

@@ -22,6 +22,7 @@ from . import _options
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Option of the backend; repeatable.")
 @_options.format_option
 @_options.holdout_option
+@_options.outside_option
 def command(
     scene: str,
     selection: Path,
@@ -37,6 +38,7 @@ def command(
     options: tuple[str, ...],
     format_: str | None,
     holdout: str | None,
+    allow_outside: bool,
 ) -> None:
     """Train one model on the chosen views of SCENE and write it, with train.json, into one folder.
 
@@ -53,7 +55,7 @@ def command(
     settings = settings_file.load()
     if iterations is None and seconds is None:
         iterations = _registry.load(backend, settings).CAPABILITIES.default_iterations
-    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout)
+    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout, allow_outside=allow_outside)
     chosen = load_selection(selection)
     if ratio is not None and count is not None:
         raise UserError("give --ratio or --count, not both")
