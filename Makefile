@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test lint types pytest bench quality format clean
+.PHONY: help setup dev reports dashboard test lint types pytest bench quality format clean clean-results
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -19,7 +19,7 @@ help:
 	@echo "make test        linters, type checks and tests"
 	@echo "make bench       timings, as ratios measured side by side"
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
-	@echo "make clean       leaves the clone as it was"
+	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "viewbench needs Python 3.11 or newer; name one with make PYTHON=..."; exit 1; }
@@ -75,5 +75,9 @@ format: dev
 	$(BIN)/snakefmt Snakefile workflow
 
 clean:
-	rm -rf $(VENV) results build dist .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf $(VENV) build dist .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+	@test ! -e results || echo "results/ is kept; make clean-results removes it"
+
+clean-results:
+	rm -rf results

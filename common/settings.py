@@ -90,6 +90,7 @@ SECTIONS: dict[str, type] = {
     "tracking": Tracking,
     "instant_ngp": InstantNgp,
 }
+MAY_BE_ZERO = ("renders", "timeout")  # no renders, no limit
 TABLES: dict[str, type] = {"scenes": SceneEntry, "command": Command}
 
 
@@ -150,8 +151,9 @@ def _section(kind: type, values: Any, where: str) -> Any:
     for name, value in values.items():
         if not isinstance(value, hints[name]) or isinstance(value, bool):
             raise UserError(f"{where}: '{name}' is {value!r}, expected {_called(hints[name])}")
-        if isinstance(value, int) and value < (0 if name == "renders" else 1):
-            raise UserError(f"{where}: '{name}' is {value}, expected a positive number")
+        least, words = (0, "0 or more") if name in MAY_BE_ZERO else (1, "a positive number")
+        if isinstance(value, int) and value < least:
+            raise UserError(f"{where}: '{name}' is {value}, expected {words}")
         if isinstance(value, list) and not all(isinstance(item, str) for item in value):
             raise UserError(f"{where}: '{name}' must be a list of strings")
     try:

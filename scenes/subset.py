@@ -21,7 +21,7 @@ def write_subset(scene: Scene, selection: dict[str, Any], out: Path, copy: bool 
     folder appears only when all of it is written. Raises UserError for an image that is missing or cut short, and for
     a folder that exists and is not empty unless `force` replaces it.
     """
-    written = scene.format if plugins.load("scenes.formats", scene.format).WRITABLE else "transforms"
+    written = scene.format if writable(plugins.load("scenes.formats", scene.format)) else "transforms"
     indices = np.asarray(selection["indices"], dtype=np.int64)
     if scene.format != "video":
         for path in (*scene.train.subset(indices).paths, *scene.test.paths):
@@ -41,7 +41,7 @@ def write_scene(
 ) -> None:
     """Writes the training views at `indices` and the test split in the format `format_name`; as `write_subset`."""
     module = plugins.load("scenes.formats", format_name)
-    if not module.WRITABLE:
+    if not writable(module):
         raise UserError(
             f"format '{format_name}' can be read and not written; write transforms or colmap (convert --to)"
         )
@@ -62,6 +62,11 @@ def write_scene(
         module.write(scene, indices, temporary, copy)
         if selection is not None:
             write_json(temporary / "selection.json", {**selection, "holdout": scene.holdout})
+
+
+def writable(module: Any) -> bool:
+    """Whether a format's module can write it: one with `detect` and `read` alone is only read."""
+    return bool(getattr(module, "WRITABLE", False))
 
 
 def place_image(source: Path, target: Path, copy: bool) -> None:

@@ -85,12 +85,12 @@ def test_a_gpu_that_says_nothing_of_use_is_none(fake_gpu, answer):
 
 
 def test_a_slow_answer_holds_nobody_up(fake_gpu, tmp_path):
-    (tmp_path / "bin" / "nvidia-smi").write_text("#!/bin/sh\nsleep 20\n")
-    began = time.monotonic()
+    answered = tmp_path / "answered"
+    (tmp_path / "bin" / "nvidia-smi").write_text(f"#!/bin/sh\nsleep 8\ntouch {answered}\n")
     _process.run([sys.executable, "-c", "pass"], tmp_path, tmp_path / "log", "it")
-    with pytest.raises(UserError, match="stopped after 0.3 s"):
+    with pytest.raises(UserError, match=r"stopped after 0\.3 s"):
         _process.run([sys.executable, "-c", "import time; time.sleep(30)"], tmp_path, tmp_path / "log", "it", 0.3)
-    assert time.monotonic() - began < 15, "of the 40 s that it would take to wait for the answers"
+    assert not answered.exists()
 
 
 def test_no_gpu_is_none(monkeypatch, tmp_path):

@@ -34,6 +34,7 @@ def test_no_keys_is_enough(tmp_path):
         ("[scenes.a]\ndataset = 'x'", "'path' is missing"),
         ("[features]\nbatch = '16'", "expected a whole number"),
         ("[features]\nbatch = 0", "expected a positive number"),
+        ("[tracking]\nrenders = -1", "expected 0 or more"),
         ("[features]\nbatch = true", "expected a whole number"),
         ("[command.x]\ntrain = 'a b'", "expected a list of texts"),
         ("[command.x]\ntrain = [1]", "list of strings"),
@@ -55,3 +56,9 @@ def test_environment_variables_come_last(tmp_path, monkeypatch):
     monkeypatch.setenv("VIEWBENCH_FEATURES_BATCH", "many")
     with pytest.raises(UserError, match="VIEWBENCH_FEATURES_BATCH"):
         load(tmp_path, "")
+
+
+def test_no_limit_and_no_renders_are_zero(tmp_path):
+    command = '[command.x]\ntrain = ["true", "{out}"]\noutput = "a.ply"\ntimeout = 0\n'
+    found = load(tmp_path, f"[tracking]\nrenders = 0\n{command}")
+    assert (found.tracking.renders, found.command["x"].timeout) == (0, 0)

@@ -221,7 +221,7 @@ def test_a_list_may_have_blanks_and_names_that_were_never_registered(tmp_path):
     assert scene.test.names == (NAMES[1],)
     assert scene.notes == ("1 of 2 names in test.txt are of no image that has a pose",)
     (folder / "sparse" / "0" / "test.txt").write_text("lost.png\n")
-    with pytest.raises(UserError, match="names image 'lost.png', which the model does not have"):
+    with pytest.raises(UserError, match=r"names image 'lost\.png', which the model does not have"):
         open_scene(str(folder), load_settings())
 
 

@@ -203,7 +203,7 @@ def test_a_selection_of_another_version_of_the_scene_is_refused():
         {"names": []},
         {"names": 3},
     ):
-        with pytest.raises(UserError, match="select again|viewbench select"):
+        with pytest.raises(UserError, match=r"select again|viewbench select"):
             check_selection({**record, **broken}, SCENE, record["scene_sha256"])
     by_hand = {key: record[key] for key in ("selector", "seed", "n_views", "indices", "names")}
     assert check_selection(by_hand, SCENE, "0" * 64).tolist() == record["indices"]
