@@ -1,6 +1,6 @@
 """What the numbers say, in sentences: is the paper's selector better than plain choice, and by more than chance?"""
 
-from ._statistics import Difference, difference, number, over_ratios, signed, summary
+from ._statistics import Difference, difference, interval, number, over_ratios, signed, summary
 from ._study import FULL, Study, and_list, percent
 
 BASELINES = ("uniform", "random")
@@ -107,8 +107,8 @@ def _at_single_ratios(study: Study, backend: str, scene: str, subject: str, base
     if len(ratios) < 2:
         return []
     found = [(ratio, against(study, backend, scene, subject, baseline, (ratio,))) for ratio in ratios]
-    parts = [f"{_with_interval(item)} at {percent(ratio)}" for ratio, item in found if item is not None]
-    return [f"Ratio by ratio: {'; '.join(parts)}."] if parts else []
+    parts = [f"{interval(item)} at {percent(ratio)}" for ratio, item in found if item is not None]
+    return [f"Ratio by ratio: {', '.join(parts)}."] if parts else []
 
 
 def _short_interval(found: Difference) -> str:

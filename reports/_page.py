@@ -10,7 +10,7 @@ from typing import Any
 from .. import __version__
 from ..common import plugins
 from ..common.errors import UserError
-from ..common.files import write_text
+from ..common.files import read_json, write_text
 from ..common.provenance import machine
 from . import _findings, _items, _study
 from ._items import Item
@@ -129,9 +129,19 @@ def _facts(study: Study) -> list[tuple[str, str]]:
         ("Page made on", f"{here['cpu']}, {here['cpus']} CPUs, {here['system']}, Python {here['python']}"),
         ("viewbench", and_list(in_order(cell.viewbench for cell in study.done)) or __version__),
         ("Commit", and_list(in_order(cell.commit for cell in study.done if cell.commit))),
+        ("Tracking", _tracking_words(study.folder)),
         ("Results gathered", _date(study.folder / "results.csv")),
     ]
     return [(what, value) for what, value in facts if value]
+
+
+def _tracking_words(folder: Path) -> str:
+    """Why the cells were not logged, where they were not; the next run tries again."""
+    stamps = [path for name in ("tracked", "tracked.partial") if (path := folder / f"{name}.json").is_file()]
+    if not stamps:
+        return ""
+    skipped = read_json(max(stamps, key=lambda path: path.stat().st_mtime_ns), "stamp of tracking").get("skipped", "")
+    return f"not logged: {skipped}" if skipped else ""
 
 
 def _grid_words(study: Study) -> str:

@@ -18,6 +18,7 @@ from ..common.settings import Tracking
 
 CELL, FINGERPRINT = "viewbench.cell", "viewbench.fingerprint"
 KEY = ("backend", "scene", "selector", "ratio", "seed")
+NO_TRACKING = "tracking.uri is empty"  # why nothing is logged where nobody wants it
 FILES = ("selection.json", "train.json", "metrics.json")
 
 

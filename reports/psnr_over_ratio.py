@@ -38,7 +38,7 @@ def _caption(study: Study) -> str:
     if 1 in counts:
         text += "Hollow markers are one sample, which has no spread to show. "
     if any(cell.selector == FULL for cell in study.done):
-        text += "Dashed: one model trained on all training views with the same budget. "
+        text += "Dashed: the mean of models trained on all training views with the same budget. "
     text += "At a ratio the selectors stand side by side so that their bars can be told apart."
     return text + failures_note(study)
 

@@ -152,7 +152,7 @@ MUTATIONS = {
     "the command that trains": (environment('"{iterations}"]\nrender', '"3"]\nrender'), OURS),
     "the command that renders": (environment('"{renders}"]', '"{renders}", "--seed", "1"]'), {"evaluate": 2, **TABLES}),
     "weights of LPIPS": (weights, {"evaluate": 6, **TABLES}),
-    "renders that are logged": (environment("renders = 1", "renders = 2"), {"track": 1, "reports": 1}),
+    "renders that are logged": (environment("renders = 1", "renders = 2"), {"track": 1, "page": 1, "reports": 1}),
     # what the machine has
     "a program's version": (
         lambda clone: (clone.folder.parent / "version.txt").write_text("2.0\n"),
@@ -188,7 +188,7 @@ MUTATIONS = {
     "the scoring": (source("backends/_metrics.py"), {"evaluate": 6, **TABLES}),
     "the description of scenes": (source("workflow/commands/describe.py"), {"describe": 1, **TABLES}),
     "a report": (source("reports/cameras.py"), {"report": 1, "page": 1, "reports": 1}),
-    "the log": (source("reports/_tracking.py"), {"track": 1, "reports": 1}),
+    "the log": (source("reports/_tracking.py"), {"track": 1, "page": 1, "reports": 1}),
     # results
     "a score that is gone": (
         lambda clone: next(clone.results.rglob("metrics.json")).unlink(),

@@ -202,11 +202,19 @@ def test_an_error_of_snakemake_itself_is_said(clone):
     assert "nowhere.txt" in done.stderr
 
 
-def test_a_tracking_server_that_is_down_does_not_stop_the_study(clone):
+def test_a_tracking_server_that_is_down_is_named_and_tried_again(clone):
     (cell(clone) / "metrics.json").unlink()
-    done = clone.snakemake(VIEWBENCH_TRACKING_URI="http://127.0.0.1:9", MLFLOW_HTTP_REQUEST_MAX_RETRIES="0")
-    assert done.returncode == 0, done.stderr
+    clone.run(VIEWBENCH_TRACKING_URI="http://127.0.0.1:9", MLFLOW_HTTP_REQUEST_MAX_RETRIES="0")
     assert (cell(clone) / "metrics.json").is_file()
+    page = clone.results / "reports" / "index.html"
+    assert "not logged: MLflow at" in page.read_text(encoding="utf-8")
+    clone.run()
+    assert json.loads((clone.results / "tracked.json").read_text()) in (
+        {"logged": 1, "kept": 1},
+        {"logged": 2, "kept": 0},
+    )
+    assert "not logged" not in page.read_text(encoding="utf-8")
+    assert clone.planned() == {}
 
 
 def test_without_a_target_everything_is_made(clone):

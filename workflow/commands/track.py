@@ -31,7 +31,7 @@ def command(study: str, results: Path, cell: str | None, stamp: Path | None) -> 
             raise UserError(f"study '{study}' has no cell '{cell}'")
     else:
         cells = _collect.without_stale(cells, results / checked.name)
-    done: dict = {"skipped": "tracking.uri is empty"}
+    done: dict = {"skipped": _tracking.NO_TRACKING}
     try:
         if settings.tracking.uri:
             done = dict(

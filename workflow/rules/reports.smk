@@ -88,6 +88,7 @@ rule report:
 rule page:
     input:
         expand(f"{RESULTS}/reports/{{report}}.items.json", report=STUDY.reports),
+        f"{RESULTS}/tracked.json",
         WIRING.page,
     output:
         f"{RESULTS}/reports/index.html",
