@@ -12,6 +12,7 @@ from ..common.files import sha256_file, write_json
 from .types import Scene
 
 REMEMBERED_BYTES = 1 << 26  # the hashes of larger scenes are kept: reading gigabytes again for every step takes hours
+KEPT_S = 90 * 86400.0  # and so long: hashes of scenes that nobody has opened since go
 SETTLED_S = 2.0  # a file changed less than that ago may change again without a new time
 
 
@@ -61,6 +62,9 @@ def _hashes(paths: list[Path]) -> list[str]:
     if fresh != known:
         with contextlib.suppress(OSError):  # a full disk or a home that cannot be written to costs time, no more
             write_json(file, fresh)
+            for other in cache.glob("*.json"):
+                if time.time() - other.stat().st_mtime > KEPT_S:
+                    other.unlink()
     return result
 
 

@@ -65,9 +65,13 @@ def test_hashes_of_large_scenes_are_kept_and_renewed(room, tmp_path, monkeypatch
     second = hashed(room)
     assert (second != first, read) == (True, [image.name])
     (cache,) = (tmp_path / "cache" / "viewbench" / "digests").iterdir()
+    old = cache.with_name("old.json")
+    old.write_text("{}")
+    os.utime(old, (1, 1))
     for damaged in ("{", "[]", json.dumps({"x": 1})):
         cache.write_text(damaged)
         assert hashed(room) == second
+    assert not old.exists()
 
 
 def test_a_file_that_has_just_changed_is_not_kept(room, tmp_path, monkeypatch):

@@ -158,6 +158,7 @@ MUTATIONS = {
         lambda clone: (clone.folder.parent / "version.txt").write_text("2.0\n"),
         {"warm": 2, "train": 4, "evaluate": 4, **TABLES},
     ),
+    "a version that nobody can tell now": (lambda clone: (clone.folder.parent / "version.txt").unlink(), {}),
     "a training image": (lambda clone: another_image(clone, 1), EVERYTHING),
     "a test image": (lambda clone: another_image(clone, 0), EVERYTHING),
     "a point": (other_points, EVERYTHING),

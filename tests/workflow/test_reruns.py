@@ -155,7 +155,8 @@ def test_a_study_whose_test_split_changes_is_made_anew(tmp_path):
     settings = f"[scenes.walk]\npath = {str(walk)!r}\nholdout = 'every:4'\n"
     (clone.folder / "environment.toml").write_text(settings, encoding="utf-8")
     clone.run()
-    before = {path: json.loads(path.read_text()) for path in clone.results.rglob("cells/**/*.json")}
+    files = [path for path in clone.results.rglob("cells/**/*.json") if not path.name.startswith(".")]
+    before = {path: json.loads(path.read_text()) for path in files}
     clone.edit("environment.toml", "every:4", "every:3")
     clone.run()
     for path, old in before.items():
@@ -194,8 +195,9 @@ def test_a_second_run_in_the_same_folder_is_told_why_it_cannot(clone):
 
 
 def test_an_error_of_snakemake_itself_is_said(clone):
-    (clone.results / "study.json").unlink()
-    clone.edit("workflow/rules/scenes.smk", "input:\n        WIRING.study_file,", 'input:\n        "nowhere.txt",')
+    (cell(clone) / "metrics.json").unlink()
+    needed = "depends=WIRING.scoring,"
+    clone.edit("workflow/rules/cells.smk", needed, f'{needed}\n        nowhere="nowhere.txt",')
     done = clone.snakemake()
     assert done.returncode != 0
     assert "MissingInputException" in done.stderr

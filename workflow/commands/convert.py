@@ -36,4 +36,6 @@ def command(
         scene, settings_file.load(), format=format_, holdout=holdout, allow_outside=allow_outside
     )
     write_scene(opened, np.arange(len(opened.train)), out, to, copy, force)
+    if to == "colmap" and opened.points is None:
+        click.echo("viewbench: the scene has no points; nerfstudio's and gsplat's COLMAP readers want some", err=True)
     click.echo(f"{len(opened.train)} training and {len(opened.test)} test views in {out}")
