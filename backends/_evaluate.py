@@ -12,7 +12,7 @@ import numpy as np
 from .. import __version__
 from ..common import plugins
 from ..common.errors import UserError
-from ..common.files import finite_or_none, read_json, sha256_file, write_json
+from ..common.files import finite_or_none, read_json, sealed, sha256_file, unsealed, write_json
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
@@ -41,6 +41,7 @@ def evaluate(
     train = read_json(model / "train.json", "training record")
     if not isinstance(train, dict) or not isinstance(train.get("files"), dict):
         raise UserError(f"'{model / 'train.json'}' is not what training writes; train again")
+    train = unsealed(train, f"'{model / 'train.json'}'")
     if not len(scene.test):
         raise UserError(f"scene '{scene.name}' has no test views; make a test split with --holdout")
     scene_hash = scene_sha256(scene)
@@ -93,6 +94,7 @@ def evaluate(
         "drawn_by": getattr(backend, "drawn_by", lambda: train["backend"])(),
         "viewbench": __version__,
     }
+    record = sealed(record)
     write_json(out / "metrics.json", record)
     return record
 

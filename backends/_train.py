@@ -16,7 +16,7 @@ import numpy as np
 from .. import __version__
 from ..common import plugins
 from ..common.errors import UserError, nearest
-from ..common.files import read_json, sha256_folder, write_json
+from ..common.files import read_json, sealed, sha256_folder, write_json
 from ..common.provenance import commit, machine
 from ..common.seeding import seed_of
 from ..common.settings import Settings
@@ -111,7 +111,8 @@ def train(
         raise UserError(f"backend '{backend_name}' left a file '{taken}', a name of viewbench's own; rename it")
     record = _record(trained, asked, selection, sha256_folder(work / "model"))
     _replace_model(work / "model", out)
-    write_json(out / "selection.json", selection)
+    write_json(out / "selection.json", sealed(selection))
+    record = sealed(record)
     write_json(out / "train.json", record)
     shutil.rmtree(work, ignore_errors=True)
     return record

@@ -13,6 +13,8 @@ from typing import Any
 
 from .errors import UserError
 
+SEAL = "content_sha256"  # of a JSON record: the hash of all the rest of it
+
 
 @contextlib.contextmanager
 def whole(path: str | os.PathLike) -> Iterator[Path]:
@@ -79,6 +81,27 @@ def read_json(path: str | os.PathLike, what: str = "file") -> Any:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
         raise UserError(f"{what} '{path}' is not valid JSON: {error}") from None
+
+
+def sealed(record: dict[str, Any]) -> dict[str, Any]:
+    """The record with the hash of its own content, by which `unsealed` finds what was edited since."""
+    bare = {key: value for key, value in record.items() if key != SEAL}
+    return {**bare, SEAL: _content_sha256(bare)}
+
+
+def unsealed(record: dict[str, Any], what: str) -> dict[str, Any]:
+    """The record without its seal; one that has none was made by somebody else, and is taken as it is.
+
+    Raises UserError, which calls the record `what`, when its content is not what was sealed.
+    """
+    bare = {key: value for key, value in record.items() if key != SEAL}
+    if SEAL in record and record[SEAL] != _content_sha256(bare):
+        raise UserError(f"{what} was edited since it was made; make it again")
+    return bare
+
+
+def _content_sha256(record: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(plain(record), sort_keys=True, allow_nan=False).encode()).hexdigest()
 
 
 def plain(value: Any) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..common import plugins
 from ..common.errors import UserError
-from ..common.files import whole_folder, write_json
+from ..common.files import sealed, whole_folder, write_json
 from .image_files import check_whole, is_file
 from .types import Scene
 
@@ -61,7 +61,7 @@ def write_scene(
     with whole_folder(out) as temporary:
         module.write(scene, indices, temporary, copy)
         if selection is not None:
-            write_json(temporary / "selection.json", {**selection, "holdout": scene.holdout})
+            write_json(temporary / "selection.json", sealed({**selection, "holdout": scene.holdout}))
 
 
 def writable(module: Any) -> bool:

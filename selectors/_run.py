@@ -183,8 +183,12 @@ def _checked(what: str, value: Any, default: Any) -> Any:
         fits = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
         expected = "a number"
         value = float(value) if fits else value
+    elif isinstance(default, int):
+        fits, expected = isinstance(value, int) and not isinstance(value, bool), "a whole number"
     elif isinstance(default, str):
         fits, expected = isinstance(value, str), "a word"
+    elif default is None or any(not isinstance(item, str) for item in default):
+        return value  # the selector's own business: nothing is known of what fits
     else:
         value = list(value) if isinstance(value, (list, tuple)) else [value]
         fits, expected = all(isinstance(item, str) for item in value), "words with commas between them"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..common.errors import UserError, nearest
-from ..common.files import plain, read_json
+from ..common.files import plain, read_json, unsealed
 from ..scenes.types import Scene
 
 # What the choice is, and not how long it took, on which version of the code, or how much each view gained.
@@ -33,11 +33,11 @@ def count_of(ratio: float, n: int, rule: str = "round") -> int:
 
 
 def load_selection(path: Path) -> dict[str, Any]:
-    """Reads `selection.json`; raises UserError when it is none."""
+    """Reads `selection.json`; raises UserError when it is none, or was edited since it was made."""
     selection = read_json(path, "selection")
     if not isinstance(selection, dict) or not isinstance(selection.get("indices"), list):
         raise UserError(f"'{path}' is no selection; make one with `viewbench select`")
-    return selection
+    return unsealed(selection, f"selection '{path}'")
 
 
 def selection_sha256(selection: dict[str, Any]) -> str:

@@ -13,7 +13,7 @@ from ..backends import _evaluate, _registry, _train
 from ..backends._metrics import lpips_weights
 from ..common import plugins
 from ..common.errors import UserError
-from ..common.files import sha256_file
+from ..common.files import sha256_file, unsealed
 from ..common.settings import Settings
 from ..scenes.digest import scene_sha256
 from ..scenes.load import open_scene
@@ -101,6 +101,11 @@ class Asked:
             "train.json": self._train(cell, entries[1], selection),
             "metrics.json": self._metrics(cell, entries[1], folder),
         }
+        for file, record in found.items():
+            try:
+                unsealed(record, file)
+            except UserError as error:
+                raise UserError(f"cell '{folder}': {error}; delete {file} there and run the study again") from None
         for file, values in expected.items():
             for key, value in values.items():
                 if found[file].get(key) != value:

@@ -1,14 +1,17 @@
 """Study files: a grid scenes × selectors × ratios × seeds × backends, checked before anything runs."""
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..backends import _registry
+from ..backends._train import all_options
 from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import Settings
+from ..selectors._run import all_parameters
 from ..selectors._types import FACTORS
 
 FOLDER = Path(__file__).resolve().parent
@@ -165,12 +168,16 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
         _known("report", "reports", report, path)
     for selector in selectors:
         _known("selector", "selectors", selector.selector, path)
+        plugin = plugins.load("selectors", selector.selector)
+        _checked(path, all_parameters, selector.selector, plugin.PARAMETERS, selector.parameters)
         factors = selector.parameters.get("factors", FACTORS)
         for factor in factors:
             if factor not in FACTORS:
                 raise UserError(f"study '{path}': unknown factor '{factor}'{nearest(factor, FACTORS)}")
     for backend in backends:
         _known("backend", "backends", backend.backend.split(":")[0], path)
+        trainer = _checked(path, _registry.load, backend.backend, settings)
+        _checked(path, all_options, backend.backend, trainer.CAPABILITIES.options, backend.options)
         if backend.iterations is None and backend.seconds is None:
             raise UserError(f"study '{path}': backend '{backend.name}' has no budget; give iterations or seconds")
         _check_grid(backend, raw, [entry.name for entry in selectors], path)
@@ -248,6 +255,14 @@ def _check_grid(backend: BackendEntry, raw: dict, selectors: list[str], path: Pa
                     f"study '{path}': the grid of backend '{backend.name}' has {axis[:-1]} {value!r}, which the study "
                     f"does not have{nearest(str(value), map(str, known))}"
                 )
+
+
+def _checked(path: Path, check: Callable, *arguments: Any) -> Any:
+    """What the function returns; its UserError names the study."""
+    try:
+        return check(*arguments)
+    except UserError as error:
+        raise UserError(f"study '{path}': {error}") from None
 
 
 def _known(kind: str, package: str, name: str, path: Path) -> None:

@@ -15,9 +15,9 @@ from snakemake.exceptions import WorkflowError
 from ..backends import _evaluate, _registry, _train
 from ..common import plugins
 from ..common.errors import UserError
-from ..common.files import read_json, sha256_file
+from ..common.files import sha256_file
 from ..common.settings import PACKAGE, Settings
-from ..reports._tracking import NO_TRACKING, is_remote
+from ..reports._tracking import is_remote
 from ..selectors import _run
 from ._depends import Lists
 from ._study import AXES, Study
@@ -224,13 +224,6 @@ class Wiring:
         """Where runs are logged to; hashed, since an address may hold a password."""
         asked = self.settings.tracking
         return hashlib.sha256(repr((asked.uri, asked.artifacts, asked.renders)).encode()).hexdigest()[:16]
-
-    def forget_what_was_not_logged(self) -> None:
-        """Removes the stamps of logging that failed, so that this run tries again."""
-        for stamp in (Path(self.results) / "tracked.json", *(Path(self.results) / "tracked").rglob("*.json")):
-            with contextlib.suppress(UserError):
-                if stamp.is_file() and read_json(stamp).get("skipped") not in (None, NO_TRACKING):
-                    stamp.unlink()
 
     @property
     def tracks_as_it_goes(self) -> bool:

@@ -122,7 +122,7 @@ def _swept(
     sure, guessed = np.flatnonzero(maps.sure), np.flatnonzero(maps.guessed)
     record |= {"sweep_views": int(maps.sure.any(axis=(1, 2)).sum()), "sweep_depths": len(sure)}
     if len(sure) < FEWEST:
-        record["fallback"] = f"the plane sweep found {len(sure)} depths to believe, fewer than {FEWEST}"
+        record["fallback"] = f"the plane sweep was left out: {len(sure)} depths to believe are fewer than {FEWEST}"
         return []
     if count < 4:
         return []

@@ -143,6 +143,21 @@ def test_an_unknown_rule_of_counting_is_answered():
         count_of(0.1, 10, "flor")
 
 
+@pytest.mark.parametrize(
+    ("default", "good", "bad"),
+    [(1, 3, "three"), (0.5, 2, "half"), (True, False, 1), ("a", "b", 3), (["a"], ["b", "c"], [1])],
+)
+def test_parameters_are_checked_against_their_defaults(default, good, bad):
+    assert _run.all_parameters("mine", {"x": default}, {"x": good}) == {"x": good}
+    with pytest.raises(UserError, match="parameter 'x' of 'mine' is"):
+        _run.all_parameters("mine", {"x": default}, {"x": bad})
+
+
+@pytest.mark.parametrize("default", [None, [1.0, 2.0]])
+def test_of_a_default_that_says_nothing_anything_goes(default):
+    assert _run.all_parameters("mine", {"x": default}, {"x": [3.0]}) == {"x": [3.0]}
+
+
 @pytest.mark.parametrize("selector", NAMES)
 def test_a_selector_that_says_so_is_greedy_and_no_other(selector):
     greedy = plugins.constant("selectors", selector, "GREEDY", False)

@@ -119,6 +119,23 @@ def test_a_model_that_was_altered_is_not_scored(clone):
         path.write_bytes(before)
 
 
+def test_what_was_damaged_is_made_again(clone):
+    """A model that cannot be scored, an edited choice, an edited score: the next run takes each of them up."""
+    model = cell(clone) / "model.ply"
+    model.write_bytes(model.read_bytes()[:-4])
+    (cell(clone) / "metrics.json").unlink()
+    clone.run()
+    selection = clone.results / "selections" / "room_human" / "maxmin" / "0.25" / "0.json"
+    selection.write_text(selection.read_text().replace("train/0000", "train/9999", 1).replace('"seed": 0', '"seed": 1'))
+    score = cell(clone, "uniform") / "metrics.json"
+    good = score.read_text()
+    score.write_text(good.replace('"psnr_db": 1', '"psnr_db": 4', 1))
+    clone.run()
+    assert json.loads(selection.read_text())["seed"] == 0
+    assert json.loads(score.read_text())["psnr_db"] == json.loads(good)["psnr_db"]
+    assert clone.planned() == {}
+
+
 def test_another_test_split_is_refused_by_every_step(tmp_path):
     """A model is never scored on views that it was trained on."""
     walk = take_frames(ROOM, tmp_path / "walk", 12)

@@ -12,7 +12,7 @@ from viewbench.backends import _evaluate, _train
 from viewbench.backends._types import Budget
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
-from viewbench.common.files import read_json, write_json
+from viewbench.common.files import read_json, sealed, write_json
 from viewbench.scenes.features import save
 from viewbench.scenes.load import open_scene
 from viewbench.selectors import _run
@@ -120,10 +120,18 @@ def test_weights_of_lpips_that_the_score_does_not_know_make_it_stale(place):
 
 
 @pytest.mark.parametrize("file", ["selection", "train", "metrics"])
+def test_what_was_edited_by_hand_does_not_count(place, file):
+    path = cell(place) / f"{file}.json"
+    record = read_json(path)
+    write_json(path, {**record, "viewbench": "99"})
+    assert f"{file}.json was edited since it was made" in gathered(place)
+
+
+@pytest.mark.parametrize("file", ["selection", "train", "metrics"])
 def test_code_that_is_not_todays_does_not_count(place, file):
     """Edited while the job ran, and put back: Snakemake has seen nothing."""
     path = cell(place) / f"{file}.json"
-    write_json(path, {**read_json(path), "code_sha256": "0" * 64})
+    write_json(path, sealed({**read_json(path), "code_sha256": "0" * 64}))
     assert f"{file}.json was made with another" in gathered(place)
 
 

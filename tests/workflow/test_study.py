@@ -1,3 +1,5 @@
+import re
+
 import pytest
 import yaml
 
@@ -58,6 +60,21 @@ def test_one_line_chooses_the_start_of_every_trainer_that_can_be_told(load):
     other = {"name": "told", "backend": "splat", "options": {"points": "rays"}}
     study = load(backends=["splat", other, "instant-ngp"], points="sweep")
     assert [entry.options for entry in study.backends] == [{"points": "sweep"}, {"points": "rays"}, {}]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"selectors": [{"selector": "maxmin", "parameters": {"factor": ["pos"]}}]}, "did you mean 'factors'"),
+        ({"selectors": [{"selector": "maxmin", "parameters": {"sigma": "wide"}}]}, "expected a number"),
+        ({"backends": [{"backend": "splat", "options": {"point": "sweep"}}]}, "did you mean 'points'"),
+        ({"backends": ["command:nobody"]}, "has no [command.nobody]"),
+    ],
+)
+def test_parameters_and_options_are_checked_before_anything_runs(load, changes, words):
+    with pytest.raises(UserError, match=re.escape(words)) as caught:
+        load(**changes)
+    assert "mine.yaml" in str(caught.value)
 
 
 def test_greedy_orders_are_those_that_say_so(load):

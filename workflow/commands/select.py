@@ -40,7 +40,7 @@ def command(**given: Any) -> None:
 
     from ...common import settings as settings_file
     from ...common.errors import UserError
-    from ...common.files import write_json
+    from ...common.files import sealed, write_json
     from ...scenes.validate import check_present
     from ...selectors import _run
     from ...selectors._selection import count_of
@@ -79,7 +79,7 @@ def command(**given: Any) -> None:
     for name, note in record.get("notes", {}).items():
         click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
     if given["selection"]:
-        write_json(given["selection"], record)
+        write_json(given["selection"], sealed(record))
     if given["out"] and not given["dry_run"]:
         from ...scenes.subset import write_subset  # no source: it writes what was chosen
 

@@ -77,6 +77,6 @@ def command(
     click.echo(f"{record['iterations']} iterations in {record['seconds']:.1f} s{primitives}")
     seeding = record["seeding"]
     if seeding.get("source"):
-        click.echo(f"started from {seeding['count']} points by {seeding['source']}")
+        click.echo(f"started from {seeding['count'] - seeding.get('shell_points', 0)} points by {seeding['source']}")
     if seeding.get("fallback"):
         click.echo(f"note: {seeding['fallback']}")
