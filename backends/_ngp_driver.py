@@ -21,9 +21,14 @@ PYNGP = "build*/**/pyngp*"  # where CMake puts the module, by the README's build
 MIN_TRANSMITTANCE = 1e-4  # as scripts/run.py scores test views
 
 
+def modules(checkout: Path) -> list[Path]:
+    """What CMake built; Python's own cache of a module says nothing of whether it is still there."""
+    return sorted(file for file in checkout.glob(PYNGP) if "__pycache__" not in file.parts)
+
+
 def import_pyngp(checkout: Path) -> Any:
     """The module that was built in the checkout. Raises ImportError where there is none."""
-    for file in sorted(checkout.glob(PYNGP)):
+    for file in modules(checkout):
         sys.path.insert(0, str(file.parent))
     return importlib.import_module("pyngp")
 

@@ -54,7 +54,7 @@ class InstantNgp:
         folder = Path(self.checkout).expanduser()
         if not folder.is_dir():
             return f"[instant_ngp] path '{folder}' is not there; {BUILD}"
-        if not any(folder.glob(_ngp_driver.PYNGP)):
+        if not _ngp_driver.modules(folder):
             return f"'{folder}' has no build/pyngp; build it with its Python bindings (cmake --build build)"
         if shutil.which(self.python) is None:
             return f"[instant_ngp] python '{self.python}' is not there; set it to the Python that pyngp was built for"
@@ -70,7 +70,7 @@ class InstantNgp:
         if not self.checkout:
             raise UserError(f"instant-ngp has no version: no checkout is configured; {BUILD}")
         folder = Path(self.checkout).expanduser()
-        module = next(iter(sorted(folder.glob(_ngp_driver.PYNGP))), None)
+        module = next(iter(_ngp_driver.modules(folder)), None)
         built = "no module" if module is None else f"sha256:{sha256_file(module)[:12]}"
         command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
         try:
