@@ -20,7 +20,7 @@ from ..scenes.images import load_images
 from ..scenes.pictures import picture_name, save_png, to_uint8
 from ..scenes.types import Scene
 from . import _registry
-from ._metrics import lpips, lpips_weights, ssim
+from ._metrics import lpips, lpips_sha256, lpips_weights, ssim
 from ._psnr import psnr_db
 
 
@@ -88,10 +88,10 @@ def evaluate(
         "scene_sha256": scene_hash,
         "holdout": scene.holdout,
         "train_sha256": sha256_file(model / "train.json"),
-        "lpips_sha256": None if weights is None else sha256_file(weights),
+        "lpips_sha256": lpips_sha256(settings.metrics.lpips_weights),
         "code_sha256": code,
         "configuration": _registry.configuration_of(backend)["render"],
-        "drawn_by": getattr(backend, "drawn_by", lambda: train["backend"])(),
+        "drawn_by": _registry.drawn_by(train["backend"], backend),
         "viewbench": __version__,
     }
     record = sealed(record)
@@ -109,9 +109,17 @@ def check_model(model: Path, train: dict[str, Any], scene: Scene, scene_hash: st
             f"{str(train.get('scene_sha256'))[:12]}, but now it has holdout '{scene.holdout}' and hash "
             f"{scene_hash[:12]}; train again"
         )
+    altered = altered_file(model, train)
+    if altered is not None:
+        raise UserError(f"'{model / altered}' is missing or not as training left it; train again")
+
+
+def altered_file(model: Path, train: dict[str, Any]) -> str | None:
+    """Name of the first file of the model that is missing or not as `train` says; None where all are well."""
     for name, sha256 in train["files"].items():
         if not (model / name).is_file() or sha256_file(model / name) != sha256:
-            raise UserError(f"'{model / name}' is missing or not as training left it; train again")
+            return name
+    return None
 
 
 def code_of(backend_name: str, backend: Any, format_name: str) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import UserError
+from ..common.files import sha256_file
 
 
 def ssim(image: np.ndarray, truth: np.ndarray) -> float:
@@ -44,6 +45,12 @@ def lpips_weights(configured: str) -> Path | None:
         return path
     cached = Path("~/.cache/torch/hub/checkpoints/alexnet-owt-7be5be79.pth").expanduser()
     return cached if cached.is_file() else None
+
+
+def lpips_sha256(configured: str) -> str | None:
+    """Hash of the weights that scores are made with; None without any."""
+    weights = lpips_weights(configured)
+    return None if weights is None else sha256_file(weights)
 
 
 def lpips(image: np.ndarray, truth: np.ndarray, weights: Path) -> float:

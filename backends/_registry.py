@@ -32,6 +32,11 @@ def configuration_of(backend: Any) -> dict[str, dict[str, Any]]:
     return {"train": {}, "render": {}} | getattr(backend, "configuration", dict)()
 
 
+def drawn_by(name: str, backend: Any) -> str:
+    """What draws the models of the backend called `name` here: it does, where it says nothing else."""
+    return getattr(backend, "drawn_by", lambda: name)()
+
+
 def version_of(backend: Any) -> str | None:
     """The backend's version; None where what would tell it is not installed here."""
     try:

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 from ..common.errors import UserError, nearest
+from ..scenes.splits import LEAST_TRACK
 from ._types import TrainingSet
 
 SOURCES = ("scene", "selected", "random")
-LEAST_TRACK = 2  # views that triangulate a point
 MARGIN = 0.5  # the random box is larger than that of the cameras by this part of its longest edge on every side
 
 

@@ -12,6 +12,7 @@ from ..scenes.types import Cameras, Points
 
 VIEWS, POINTS, FEWEST_DEPTHS = 400, 2000, 100  # looked at, at most; depths that are worth going by, at least
 NEAREST, NEAR, FAR = 0.001, 0.01, 0.99  # quantiles of the depths
+NEAR_PLANE = 0.25  # share of the nearest depth that trainers put their near plane at
 BEYOND = 0.5, 3.0  # the range of depths, as multiples of NEAR and FAR: mirrors and windows are deeper than points
 # Where there are no points: depths as multiples of the mean reach of the cameras (along the two longest of their axes),
 # of which a straight path has one; and the farthest, of their extent.

@@ -86,7 +86,7 @@ def read_json(path: str | os.PathLike, what: str = "file") -> Any:
 def sealed(record: dict[str, Any]) -> dict[str, Any]:
     """The record with the hash of its own content, by which `unsealed` finds what was edited since."""
     bare = {key: value for key, value in record.items() if key != SEAL}
-    return {**bare, SEAL: _content_sha256(bare)}
+    return {**bare, SEAL: content_sha256(bare)}
 
 
 def unsealed(record: dict[str, Any], what: str) -> dict[str, Any]:
@@ -95,12 +95,13 @@ def unsealed(record: dict[str, Any], what: str) -> dict[str, Any]:
     Raises UserError, which calls the record `what`, when its content is not what was sealed.
     """
     bare = {key: value for key, value in record.items() if key != SEAL}
-    if SEAL in record and record[SEAL] != _content_sha256(bare):
+    if SEAL in record and record[SEAL] != content_sha256(bare):
         raise UserError(f"{what} was edited since it was made; make it again")
     return bare
 
 
-def _content_sha256(record: dict[str, Any]) -> str:
+def content_sha256(record: dict[str, Any]) -> str:
+    """Hex SHA-256 of a record, whatever the order of its keys and the layout of its file."""
     return hashlib.sha256(json.dumps(plain(record), sort_keys=True, allow_nan=False).encode()).hexdigest()
 
 
@@ -127,6 +128,11 @@ def sha256_folder(path: str | os.PathLike) -> dict[str, str]:
     root = Path(path)
     files = sorted(file for file in root.rglob("*") if file.is_file())
     return {file.relative_to(root).as_posix(): sha256_file(file) for file in files}
+
+
+def user_cache(name: str) -> Path:
+    """The folder `name` in viewbench's part of the user's cache. Raises RuntimeError where there is no home."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "viewbench" / name
 
 
 def sha256_file(path: str | os.PathLike) -> str:

@@ -81,6 +81,11 @@ class Settings:
     instant_ngp: InstantNgp = InstantNgp()
     command: dict[str, Command] = field(default_factory=dict)
 
+    def dataset_of(self, scene: str, otherwise: str) -> str:
+        """The group that tables put a scene in; `otherwise` where the file names none."""
+        entry = self.scenes.get(scene)
+        return (entry.dataset if entry else "") or otherwise
+
 
 SECTIONS: dict[str, type] = {
     "data": Data,

@@ -28,6 +28,7 @@ def sources(*modules: str) -> dict[str, str]:
     return {path.relative_to(PACKAGE).as_posix(): _hash(path) for path in paths}
 
 
+@functools.cache
 def code_sha256(*modules: str) -> str:
     """One hash of the sources of these modules: it changes when, and only when, one of them does."""
     lines = (f"{sha256}  {name}\n" for name, sha256 in sources(*modules).items())

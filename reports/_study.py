@@ -127,15 +127,16 @@ class Study:
 
     def asks(self, backend: str, selector: str) -> bool:
         """Whether the part of the grid that a backend runs has this selector."""
-        found: dict[str, Any] = next((entry for entry in self.record["backends"] if entry["name"] == backend), {})
-        return selector in ((found.get("grid") or {}).get("selectors") or self.selectors)
+        return selector in self._grid_of(backend).get("selectors", self.selectors)
 
     def ratios_of(self, backend: str) -> tuple[float, ...]:
         """The ratios that a backend runs, all of the study's unless the study says otherwise; ascending."""
-        for entry in self.record["backends"]:
-            if entry["name"] == backend and (entry.get("grid") or {}).get("ratios"):
-                return tuple(sorted(entry["grid"]["ratios"]))
-        return self.ratios
+        return tuple(sorted(self._grid_of(backend).get("ratios", self.ratios)))
+
+    def _grid_of(self, backend: str) -> dict[str, Any]:
+        """The part of the grid that a backend runs; empty for all of it."""
+        grids: dict[str, dict[str, Any]] = {entry["name"]: entry.get("grid", {}) for entry in self.record["backends"]}
+        return grids.get(backend, {})
 
     def scene(self, name: str) -> SceneInfo:
         """Cameras of a scene; raises UserError when its description is missing or lacks a part."""

@@ -12,12 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ..common.cells import AXES, cell_folder, cell_name
 from ..common.errors import UserError
 from ..common.files import read_json
 from ..common.settings import Tracking
 
 CELL, FINGERPRINT = "viewbench.cell", "viewbench.fingerprint"
-KEY = ("backend", "scene", "selector", "ratio", "seed")
+KEY = AXES
 NO_TRACKING = "tracking.uri is empty"  # why nothing is logged where nobody wants it
 FILES = ("selection.json", "train.json", "metrics.json")
 
@@ -59,11 +60,11 @@ def track(
         experiment = _experiment(client, study, tracking, is_remote(uri))
         known = _known_runs(client, experiment)
         done = {"logged": 0, "kept": 0}
-        ready = [cell for cell in cells if all((_folder(results, cell) / name).is_file() for name in FILES)]
+        ready = [cell for cell in cells if all((cell_folder(results, cell) / name).is_file() for name in FILES)]
         for number, cell in enumerate(ready):
-            folder = _folder(results, cell)
+            folder = cell_folder(results, cell)
             fingerprint = _fingerprint(folder)
-            name = "/".join(cell[key] for key in KEY)
+            name = cell_name(cell)
             runs = known.get(name, [])
             current = [run for run in runs if run[1] == fingerprint]
             for run_id, _ in [run for run in runs if run not in current[:1]]:
@@ -88,10 +89,6 @@ def local_uri(uri: str) -> str:
     path = Path(uri.removeprefix(prefix)).resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
     return f"{prefix}{path}"
-
-
-def _folder(results: Path, cell: dict[str, str]) -> Path:
-    return results.joinpath("cells", *(cell[key] for key in KEY))
 
 
 def _fingerprint(folder: Path) -> str:

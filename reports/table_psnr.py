@@ -69,14 +69,12 @@ def _scores(study: Study, metric: Metric, out: Path) -> Item:
             row += [Entry(scene), Entry(percent(ratio), ratio), Entry(str(count or ""), count)]
             for name in selectors:
                 item = shown[name]
-                text = (
-                    ""
-                    if item is None
-                    else with_spread(item, metric.digits, expected if name != FULL else (item.n if item else 1))
-                )
-                row.append(Entry(text, None if item is None else item.mean, best.get(name, False)))
-                if item is not None:
-                    records.append(_record(metric, backend, scene, name, 1.0 if name == FULL else ratio, item))
+                if item is None:
+                    row.append(Entry(""))
+                    continue
+                text = with_spread(item, metric.digits, item.n if name == FULL else expected)
+                row.append(Entry(text, item.mean, best.get(name, False)))
+                records.append(_record(metric, backend, scene, name, 1.0 if name == FULL else ratio, item))
             rows.append(tuple(row))
     head = ["backend"] if len(study.backends) > 1 else []
     labels = [*head, "scene", "ratio", "views"]

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from ..common.errors import UserError
-from ..common.files import sha256_file, write_json
+from ..common.files import sha256_file, user_cache, write_json
 from .types import Scene
 
 REMEMBERED_BYTES = 1 << 26  # the hashes of larger scenes are kept: reading gigabytes again for every step takes hours
@@ -46,7 +46,7 @@ def _hashes(paths: list[Path]) -> list[str]:
     # Absolute and not resolved: two links to one file are two entries, and nothing has to be looked up for them.
     names = [os.fsencode(path.absolute()).hex() for path in paths]
     try:
-        cache = _cache()
+        cache = user_cache("digests")
     except RuntimeError:  # nobody's home
         return [sha256_file(path) for path in paths]
     file = cache / f"{hashlib.sha256(chr(10).join(sorted(names)).encode()).hexdigest()[:32]}.json"
@@ -80,7 +80,3 @@ def _remembered(file: Path) -> dict[str, list]:
     except (OSError, ValueError):
         return {}
     return known if isinstance(known, dict) else {}
-
-
-def _cache() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "viewbench" / "digests"

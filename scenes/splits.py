@@ -8,7 +8,7 @@ import numpy as np
 from ..common.errors import UserError
 from .types import Points, Scene
 
-LEAST_TRACK = 2  # training views that see a point: fewer cannot have triangulated it
+LEAST_TRACK = 2  # views that see a point: fewer cannot have triangulated it
 BLOCKS = 6  # held-out blocks of `blocks:8` in a capture that is long enough
 
 

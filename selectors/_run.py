@@ -16,6 +16,7 @@ from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
 from ..scenes.types import Scene, Split
 from ._normalise import normalise
+from ._selection import is_greedy
 from ._types import Views
 
 PLAIN = ("random", "uniform", "full")  # selectors that compare nothing
@@ -87,7 +88,7 @@ def run(
         },
         "features_sha256": None if views.features is None else features_sha256(views.features),
         "code_sha256": code,
-        "greedy": bool(getattr(plugin, "GREEDY", False)) and not options.get("sample"),
+        "greedy": is_greedy(selector, options),
         "viewbench": __version__,
     }
     return record | ({"notes": dict(choice.notes)} if choice.notes else {})

@@ -1,15 +1,14 @@
 """`selection.json`: how many views, the hash of the choice, and the first K views of a greedy order."""
 
-import hashlib
-import json
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..common import plugins
 from ..common.errors import UserError, nearest
-from ..common.files import plain, read_json, unsealed
+from ..common.files import content_sha256, read_json, unsealed
 from ..scenes.types import Scene
 
 # What the choice is, and not how long it took, on which version of the code, or how much each view gained.
@@ -32,6 +31,11 @@ def count_of(ratio: float, n: int, rule: str = "round") -> int:
     return max(1, round(share) if rule == "round" else math.floor(round(share, 9)))
 
 
+def is_greedy(selector: str, parameters: dict[str, Any]) -> bool:
+    """Whether the views that a selector chooses for a smaller count are the first of those for a larger one."""
+    return bool(plugins.constant("selectors", selector, "GREEDY", False)) and not parameters.get("sample")
+
+
 def load_selection(path: Path) -> dict[str, Any]:
     """Reads `selection.json`; raises UserError when it is none, or was edited since it was made."""
     selection = read_json(path, "selection")
@@ -42,8 +46,7 @@ def load_selection(path: Path) -> dict[str, Any]:
 
 def selection_sha256(selection: dict[str, Any]) -> str:
     """Hex SHA-256 of the choice: equal on every machine that chooses the same views of the same scene."""
-    choice = {key: plain(selection.get(key)) for key in CHOICE}
-    return hashlib.sha256(json.dumps(choice, sort_keys=True).encode()).hexdigest()
+    return content_sha256({key: selection.get(key) for key in CHOICE})
 
 
 def first_views(selection: dict[str, Any], count: int) -> dict[str, Any]:

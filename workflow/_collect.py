@@ -5,11 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from ..common.cells import cell_folder, cell_name
 from ..common.errors import UserError
 from ..common.files import read_json, whole
 from ..common.settings import Settings
 from ._stale import Asked
-from ._study import AXES, Study
+from ._study import Study
 
 COLUMNS = (
     "study",
@@ -36,11 +37,6 @@ COLUMNS = (
     "viewbench",
     "status",
 )
-
-
-def cell_folder(results: Path, row: dict[str, str]) -> Path:
-    """results/STUDY/cells/BACKEND/SCENE/SELECTOR/RATIO/SEED."""
-    return results.joinpath("cells", *(row[key] for key in AXES))
 
 
 def collect(study: Study, results: Path, settings: Settings, partial: bool = False) -> list[dict[str, Any]]:
@@ -73,10 +69,10 @@ def without_stale(cells: list[dict[str, str]], results: Path) -> list[dict[str, 
     """The cells that `results.csv` calls ok; all of them where it has not been written."""
     try:
         with open(results / "results.csv", newline="", encoding="utf-8") as file:
-            sound = {tuple(row[axis] for axis in AXES) for row in csv.DictReader(file) if row["status"] == "ok"}
+            sound = {cell_name(row) for row in csv.DictReader(file) if row["status"] == "ok"}
     except (OSError, KeyError):
         return cells
-    return [cell for cell in cells if tuple(cell[axis] for axis in AXES) in sound]
+    return [cell for cell in cells if cell_name(cell) in sound]
 
 
 def _figures(cell: dict[str, str], folder: Path, asked: Asked) -> dict[str, Any]:
@@ -109,8 +105,7 @@ def _figures(cell: dict[str, str], folder: Path, asked: Asked) -> dict[str, Any]
 def _logs(results: Path, cell: dict[str, str]) -> dict[Path, str]:
     """Logs of the steps that the cell needs, with the name of the step."""
     logs = results / "logs"
-    in_cell = Path(*(cell[key] for key in AXES[:-1]), f"{cell['seed']}.log")
-    found = {logs / step / in_cell: step for step in ("train", "evaluate")}
+    found = {logs / step / f"{cell_name(cell)}.log": step for step in ("train", "evaluate")}
     found |= dict.fromkeys(logs.glob(f"select/{cell['scene']}/{cell['selector']}/*/*.log"), "select")
     return found | {logs / "features" / f"{cell['scene']}.log": "features"}
 

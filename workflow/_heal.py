@@ -2,17 +2,17 @@
 
 import contextlib
 from pathlib import Path
-from typing import Any
 
+from ..backends._evaluate import altered_file
+from ..common.cells import cell_folder
 from ..common.errors import UserError
-from ..common.files import read_json, sha256_file, unsealed
+from ..common.files import read_json, unsealed
 from ..reports._tracking import NO_TRACKING
-from ._collect import cell_folder
 from ._study import Study
 
 
-def heal(study: Study, results: Path) -> list[Path]:
-    """Removes selections, records and stamps that are damaged, and returns which; `results` is results/STUDY.
+def heal(study: Study, results: Path) -> None:
+    """Removes selections, records and stamps that are damaged; `results` is results/STUDY.
 
     Choices, records and scores that were edited or cut short go, and the record of a model that has no score and whose
     files are not as training left them (evaluating it has failed, and would again), and the stamps of logging that
@@ -28,7 +28,6 @@ def heal(study: Study, results: Path) -> list[Path]:
     broken += [path for path in _stamps(results) if _failed(path)]
     for path in broken:
         path.unlink(missing_ok=True)
-    return broken
 
 
 def _sound(path: Path) -> bool:
@@ -41,9 +40,8 @@ def _sound(path: Path) -> bool:
 
 def _whole_model(folder: Path) -> bool:
     """Whether all files of the model are there and as `train.json` says."""
-    with contextlib.suppress(UserError, AttributeError, KeyError, OSError):
-        files: dict[str, Any] = read_json(folder / "train.json")["files"]
-        return all(sha256_file(folder / name) == sha256 for name, sha256 in files.items())
+    with contextlib.suppress(UserError, AttributeError, KeyError, TypeError, OSError):
+        return altered_file(folder, read_json(folder / "train.json")) is None
     return False
 
 

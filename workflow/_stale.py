@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..backends import _evaluate, _registry, _train
-from ..backends._metrics import lpips_weights
+from ..backends._metrics import lpips_sha256
 from ..common import plugins
 from ..common.errors import UserError
 from ..common.files import sha256_file, unsealed
@@ -43,10 +43,13 @@ class Asked:
     def scene(self, name: str) -> SceneNow:
         """The scene as it is now. Raises UserError where it cannot be read."""
         opened = open_scene(name, self.settings)
-        entry = self.settings.scenes.get(name)
-        dataset = (entry.dataset if entry else "") or opened.name
-        width = int(opened.train.cameras.width[0])
-        return SceneNow(dataset, opened.format, scene_sha256(opened), opened.train.names, width)
+        return SceneNow(
+            dataset=self.settings.dataset_of(name, opened.name),
+            format=opened.format,
+            sha256=scene_sha256(opened),
+            names=opened.train.names,
+            width=int(opened.train.cameras.width[0]),
+        )
 
     @functools.cache  # noqa: B019
     def _features_sha256(self, scene: str) -> str | None:
@@ -59,10 +62,9 @@ class Asked:
             return None
         return _run.features_sha256(_run.unit_rows(load_user_features(path, len(names)), names))
 
-    @functools.cache  # noqa: B019
+    @functools.cached_property
     def _lpips_sha256(self) -> str | None:
-        weights = lpips_weights(self.settings.metrics.lpips_weights)
-        return None if weights is None else sha256_file(weights)
+        return lpips_sha256(self.settings.metrics.lpips_weights)
 
     @functools.cache  # noqa: B019
     def _parameters(self, name: str) -> dict[str, Any]:
@@ -94,12 +96,12 @@ class Asked:
         metrics: dict[str, Any],
     ) -> None:
         """Raises UserError, which names the file to delete, where one was made from something else."""
-        entries = self.study.selector(cell["selector"]), self.study.backend(cell["backend"])
+        selector, backend = self.study.selector(cell["selector"]), self.study.backend(cell["backend"])
         found = {"selection.json": selection, "train.json": train, "metrics.json": metrics}
         expected = {
-            "selection.json": self._selection(cell, entries[0]),
-            "train.json": self._train(cell, entries[1], selection),
-            "metrics.json": self._metrics(cell, entries[1], folder),
+            "selection.json": self._selection(cell, selector),
+            "train.json": self._train(cell, backend, selection),
+            "metrics.json": self._metrics(cell, backend, folder),
         }
         for file, record in found.items():
             try:
@@ -116,16 +118,17 @@ class Asked:
 
     def _selection(self, cell: dict[str, str], entry: SelectorEntry) -> dict[str, Any]:
         scene = self.scene(cell["scene"])
-        uses_features = entry.needs_features and self.study.encoder != "none"
-        values = {
+        values: dict[str, Any] = {
             "scene_sha256": scene.sha256,
             "selector": entry.selector.replace("_", "-"),
             "parameters": self._parameters(cell["selector"]),
-            "seed": int(cell["seed"]) if entry.seeded else 0,
+            "seed": entry.choice_seed(int(cell["seed"])),
             "count": count_of(float(cell["ratio"]), len(scene.names), self.study.count),
             "code_sha256": _run.code_of(entry.selector, scene.format),
         }
-        return values | ({"features_sha256": self._features_sha256(cell["scene"])} if uses_features else {})
+        if self.study.gives_features(entry):
+            values["features_sha256"] = self._features_sha256(cell["scene"])
+        return values
 
     def _train(self, cell: dict[str, str], entry: BackendEntry, selection: dict[str, Any]) -> dict[str, Any]:
         scene, trainer = self.scene(cell["scene"]), self._trainer(cell["backend"])
@@ -148,7 +151,7 @@ class Asked:
         return {
             "scene_sha256": scene.sha256,
             "train_sha256": sha256_file(folder / "train.json"),
-            "lpips_sha256": self._lpips_sha256(),
+            "lpips_sha256": self._lpips_sha256,
             "configuration": trainer["rendering"],
             "code_sha256": _evaluate.code_of(entry.backend, trainer["backend"], scene.format),
         }

@@ -12,12 +12,12 @@ from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import Settings
 from ..selectors._run import all_parameters
+from ..selectors._selection import is_greedy
 from ..selectors._types import FACTORS
 
 FOLDER = Path(__file__).resolve().parent
 STUDIES = FOLDER / "studies"
 REFERENCE = "full"
-AXES = ("backend", "scene", "selector", "ratio", "seed")  # the folders of a cell, from the outside
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,11 @@ class SelectorEntry:
     @property
     def greedy(self) -> bool:
         """Whether the views of a smaller count are the first of those of a larger one."""
-        if self.parameters.get("sample"):
-            return False
-        return bool(plugins.constant("selectors", self.selector, "GREEDY", False))
+        return is_greedy(self.selector, self.parameters)
+
+    def choice_seed(self, seed: int) -> int:
+        """Seed of the choice in the cells with this seed: one choice serves all of them where it has no randomness."""
+        return seed if self.seeded else 0
 
     @property
     def needs_features(self) -> bool:
@@ -90,6 +92,10 @@ class Study:
     def backend(self, name: str) -> BackendEntry:
         """The entry that results call `name`."""
         return next(entry for entry in self.backends if entry.name == name)
+
+    def gives_features(self, entry: SelectorEntry) -> bool:
+        """Whether the selector gets image features: where it uses them and the study has an encoder."""
+        return entry.needs_features and self.encoder != "none"
 
     def cells(self) -> list[dict[str, str]]:
         """One row a cell, all values as the folders under `cells/` spell them.

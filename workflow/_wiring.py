@@ -13,14 +13,16 @@ from typing import Any
 from snakemake.exceptions import WorkflowError
 
 from ..backends import _evaluate, _registry, _train
+from ..backends._metrics import lpips_sha256
 from ..common import plugins
+from ..common.cells import cell_name
 from ..common.errors import UserError
 from ..common.files import sha256_file
 from ..common.settings import PACKAGE, Settings
 from ..reports._tracking import is_remote
 from ..selectors import _run
 from ._depends import Lists
-from ._study import AXES, Study
+from ._study import Study
 
 # Installed packages whose version may change a step's numbers; a backend's version names its own.
 CHOOSING = ("numpy", "scipy", "numba")
@@ -50,7 +52,7 @@ class Wiring:
     @property
     def cell_patterns(self) -> list[str]:
         """BACKEND/SCENE/SELECTOR/RATIO/SEED of every cell."""
-        return ["/".join(cell[axis] for axis in AXES) for cell in self.cells]
+        return [cell_name(cell) for cell in self.cells]
 
     def alternatives(self, column: str) -> str:
         """Regular expression of the values that a wildcard can take."""
@@ -110,9 +112,7 @@ class Wiring:
     def features(self, wildcards: Any) -> list[str]:
         """The scene's features, where the selector uses them."""
         entry = self.study.selector(wildcards.selector)
-        if self.study.encoder == "none" or not entry.needs_features:
-            return []
-        return [f"{self.results}/features/{wildcards.scene}.npy"]
+        return [f"{self.results}/features/{wildcards.scene}.npy"] if self.study.gives_features(entry) else []
 
     def choosing(self, wildcards: Any) -> str:
         """What a selection depends on besides scene, features and options."""
@@ -124,8 +124,8 @@ class Wiring:
         """The file with a cell's choice: one for all ratios of a tier where the order is greedy, one for all backends
         and, where the selector has no randomness, for all seeds."""
         entry = self.study.selector(wildcards.selector)
-        seed = wildcards.seed if entry.seeded else 0
         ratio = float(wildcards.ratio)
+        seed = entry.choice_seed(int(wildcards.seed))
         part = next(tier for tier in TIERS if ratio <= tier) if entry.greedy else ratio
         return f"{self.results}/selections/{wildcards.scene}/{wildcards.selector}/{part!r}/{seed}.json"
 
@@ -175,18 +175,15 @@ class Wiring:
         if not self.lists.writes:
             return self.lists.path(step)
         modules = ("workflow.commands.evaluate", *_evaluate.modules_of(name, self._backend(name)))
-        drawn_by = getattr(self._backend(name), "drawn_by", lambda: name)()
+        drawn_by = _registry.drawn_by(name, self._backend(name))
         values = {"configuration": self._facts(name)["render"], "drawn by": drawn_by, "lpips": self._lpips}
         return self.lists.path(step, modules, values, SCORING)
 
     @cached_property
     def _lpips(self) -> str | None:
         """Hash of the weights of LPIPS; None without them."""
-        from ..backends._metrics import lpips_weights
-
         with explained():
-            weights = lpips_weights(self.settings.metrics.lpips_weights)
-        return None if weights is None else sha256_file(weights)
+            return lpips_sha256(self.settings.metrics.lpips_weights)
 
     def backend_options(self, wildcards: Any) -> str:
         """Options of `viewbench train` for the cell's backend."""

@@ -10,7 +10,7 @@ import torch
 
 from ...common.errors import UserError
 from .._gaussian_ply import Gaussians
-from .._surroundings import surroundings
+from .._surroundings import NEAR_PLANE, surroundings
 from .._types import Budget, Report, TrainingSet
 from .densification import PAPER_STEPS, Densification
 from .gaussians import (
@@ -25,7 +25,6 @@ from .renderer import Renderer
 
 SH_EVERY = 1000  # steps of PAPER_STEPS after which one more band of spherical harmonics takes part
 CURVE_POINTS = 20
-NEAR = 0.25  # near plane, share of the depth that next to nothing is nearer than
 RESIDENT_SHARE = 0.25  # of the free GPU memory that images may take; above, each is sent when it is used
 
 
@@ -52,7 +51,7 @@ def fit(
     data, options = task.data, task.options
     around = surroundings(data.training, None if options["points"] == "random" else data.points)
     extent = around.extent
-    renderer = Renderer(rasterize, device, options["background"], NEAR * around.nearest)
+    renderer = Renderer(rasterize, device, options["background"], NEAR_PLANE * around.nearest)
     params = renderer.parameters(starting(xyz, rgb, options["strategy"], options["sh_degree"], extent))
     try:
         run = _run(task, params, extent, renderer)

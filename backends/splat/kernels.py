@@ -5,6 +5,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+from ...common.files import user_cache
+
 
 def _prepare() -> None:
     """Settings that numba reads when it is first imported, unless the user has made them.
@@ -15,9 +17,8 @@ def _prepare() -> None:
     quarter of the speed).
     """
     if "NUMBA_CACHE_DIR" not in os.environ:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         sources = b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
-        os.environ["NUMBA_CACHE_DIR"] = str(base / "viewbench" / f"numba-{hashlib.sha256(sources).hexdigest()[:16]}")
+        os.environ["NUMBA_CACHE_DIR"] = str(user_cache(f"numba-{hashlib.sha256(sources).hexdigest()[:16]}"))
     if "NUMBA_CPU_FEATURES" not in os.environ and "NUMBA_CPU_NAME" not in os.environ:
         try:
             import llvmlite.binding as llvm

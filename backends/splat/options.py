@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from ...common.errors import UserError
+from .._surroundings import NEAR_PLANE
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Options:
     scale_weight: float = 0.0
     relocate_every: int = 100
     relocate_until: float = 0.85  # share of the budget; 0 never relocates
-    near: float = 0.25  # near plane, share of the depth that next to nothing is nearer than
+    near: float = NEAR_PLANE  # near plane, share of the depth that next to nothing is nearer than
     background: float = 0.0  # grey level behind everything
 
     def __post_init__(self) -> None:

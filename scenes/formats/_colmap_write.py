@@ -9,6 +9,7 @@ import numpy as np
 
 from ...common.errors import UserError
 from ..image_files import is_file, stored_name
+from ..splits import LEAST_TRACK
 from ..subset import place_image
 from ..types import Cameras, Points, Scene, Split
 
@@ -16,7 +17,6 @@ FOLDERS = ("images", "images_2", "images_4", "images_8")
 TEST = "test.txt"  # beside the model: names of the images that are held out, one a line
 TEST_MODEL = "test/sparse/0"  # the held-out images' own model, their pictures in test/images
 BOTH_MODEL = "colmap/sparse/0"  # nerfstudio's, with the images of both splits
-LEAST_TRACK = 2  # images that triangulate a point
 
 
 def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:

@@ -1,6 +1,5 @@
 """A video file (by PyAV): frames chosen by content, time and sharpness, written with their original numbers."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import UserError
-from ...common.files import read_json, sha256_file, whole_folder, write_json
+from ...common.files import read_json, sha256_file, user_cache, whole_folder, write_json
 from ..types import Scene, Split
 from .images import nominal_cameras, unposed
 
@@ -29,8 +28,7 @@ def read(root: Path) -> Scene:
     The video is decoded once, frame by frame, into a cache of small pictures named by the file's content; what is in
     memory is one frame. Raises UserError for a file that is no video, and when PyAV is not installed.
     """
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "viewbench" / "video"
-    folder = base / f"{sha256_file(root)[:32]}-{SMALL}"
+    folder = user_cache("video") / f"{sha256_file(root)[:32]}-{SMALL}"
     if not (folder / "frames.json").is_file():
         with whole_folder(folder) as temporary:
             times, size = _extract(root, temporary)

@@ -30,7 +30,6 @@ def command(
 
     settings = settings_file.load()
     opened = open_scene(scene, settings, format=format_, holdout=holdout, allow_outside=allow_outside)
-    entry = settings.scenes.get(scene)
 
     def split(part: Split) -> dict:
         return {
@@ -48,7 +47,7 @@ def command(
     record = {
         "schema": 1,
         "scene": opened.name,
-        "dataset": (entry.dataset if entry else "") or opened.name,
+        "dataset": settings.dataset_of(scene, opened.name),
         "format": opened.format,
         "holdout": opened.holdout,
         "n_train": len(opened.train),

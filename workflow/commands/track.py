@@ -17,6 +17,7 @@ def command(study: str, results: Path, cell: str | None, stamp: Path | None) -> 
     import sys
 
     from ...common import settings as settings_file
+    from ...common.cells import cell_name
     from ...common.errors import UserError
     from ...common.files import write_json
     from ...reports import _tracking
@@ -26,7 +27,7 @@ def command(study: str, results: Path, cell: str | None, stamp: Path | None) -> 
     checked = _study.load(study, settings)
     cells = checked.cells()
     if cell is not None:
-        cells = [row for row in cells if "/".join(row[key] for key in _tracking.KEY) == cell]
+        cells = [row for row in cells if cell_name(row) == cell]
         if not cells:
             raise UserError(f"study '{study}' has no cell '{cell}'")
     else:
