@@ -11,6 +11,7 @@ from ..scenes.types import Cameras
 from . import _gaussian_ply
 
 NEAR = 0.01  # scene units
+BLACK = 0.0  # background
 
 
 def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
@@ -22,10 +23,10 @@ def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
     gsplat = _module("gsplat").Gsplat()
     reason = gsplat.available()
     if reason is None:
-        renderer = _module("gsplat.renderer").Renderer(gsplat.rasterizer(), gsplat.device, "black", NEAR)
+        renderer = _module("gsplat.renderer").Renderer(gsplat.rasterizer(), gsplat.device, BLACK, NEAR)
         yield from renderer.images(renderer.parameters(gaussians), cameras, gaussians.degree)
         return
-    rendering = _module("splat.options").Rendering(near=NEAR, degree=gaussians.degree)
+    rendering = _module("splat.options").Rendering(near=NEAR, background=BLACK, degree=gaussians.degree)
     model = _module("splat.ply").read(path)
     yield from _module("splat.loop").draw(model, cameras, rendering)
 

@@ -18,7 +18,7 @@ from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.files import read_json, sealed, sha256_folder, write_json
 from ..common.provenance import commit, machine
-from ..common.seeding import seed_of
+from ..common.rng import seed_of
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
@@ -28,7 +28,7 @@ from ..selectors._selection import check_selection, selection_sha256
 from . import _registry
 from ._memory import peak_rss_bytes
 from ._psnr import psnr_db
-from ._types import Budget, Probe, Report, Trained, TrainingSet
+from ._types import Budget, Job, Probe, Report, Trained, TrainingSet
 
 OURS = ("selection.json", "train.json", "metrics.json", "renders")  # beside a model: no file of it may be called so
 LEFT = ".files.json"  # names of the model's files, for the training that replaces it
@@ -39,35 +39,30 @@ PROBE_VIEWS = 8  # test views behind the curve; enough for its shape, few enough
 def train(
     scene: Scene,
     selection: dict[str, Any],
-    backend_name: str,
+    job: Job,
     out: Path,
     *,
     settings: Settings,
-    seed: int,
-    budget: Budget,
-    width: int | None = None,
-    options: dict[str, Any] | None = None,
-    curve: bool = True,
     progress: Callable[[int, int | None, str], None] = lambda done, total, text: None,
 ) -> dict[str, Any]:
     """Trains one model on the chosen views and returns what `train.json` in `out` says.
 
-    `width` resizes the images (pixels); None keeps them. The files of the model appear in `out` only when all of them
-    are written, `train.json` last. Raises UserError for a backend that is unavailable or unknown, an option that it
-    does not have, a selection that does not fit the scene, and whatever the backend refuses.
+    The files of the model appear in `out` only when all of them are written, `train.json` last. Raises UserError for
+    a backend that is unavailable or unknown, an option that it does not have, a selection that does not fit the
+    scene, and whatever the backend refuses.
     """
-    backend = _registry.load(backend_name, settings)
+    backend = _registry.load(job.backend, settings)
     reason = backend.available()
     if reason:
-        raise UserError(f"backend '{backend_name}' is not available: {reason}")
-    options = all_options(backend_name, backend.CAPABILITIES.options, options or {})
-    _obeyed(backend_name, backend.CAPABILITIES, budget)
+        raise UserError(f"backend '{job.backend}' is not available: {reason}")
+    options = all_options(job.backend, backend.CAPABILITIES.options, job.options)
+    _obeyed(job.backend, backend.CAPABILITIES, job.budget)
     if not scene.posed:
         raise UserError(f"'{scene.name}' has no poses to train with; run structure-from-motion (COLMAP) first")
     scene_hash = scene_sha256(scene)
     indices = check_selection(selection, scene, scene_hash)
     views = scene.train.subset(indices)
-    images, cameras = load_images(scene.train, indices, width)
+    images, cameras = load_images(scene.train, indices, job.width)
     data = TrainingSet(
         scene=scene.name,
         names=views.names,
@@ -75,40 +70,40 @@ def train(
         images=images,
         points=scene.points,
         chosen=indices,
-        training=scene.train.cameras if width is None else scene.train.cameras.scaled(width),
+        training=scene.train.cameras if job.width is None else scene.train.cameras.scaled(job.width),
     )
     # Neither selector nor count is in it: what is drawn beside the views (which of the scene's points, say) is then
     # the same for every choice.
-    cell_seed = seed_of("train", backend_name, scene.name, seed) % 2**31
+    cell_seed = seed_of("train", job.backend, scene.name, job.seed) % 2**31
     asked = {
-        "backend": backend_name,
+        "backend": job.backend,
         "scene": scene.name,
         "scene_sha256": scene_hash,
         "holdout": scene.holdout,
         "selection_sha256": selection_sha256(selection),
-        "code_sha256": code_of(backend_name, scene.format),
-        "seed": seed,
+        "code_sha256": code_of(job.backend, scene.format),
+        "seed": job.seed,
         "width": int(cameras.width[0]),
-        "budget": dataclasses.asdict(budget),
+        "budget": dataclasses.asdict(job.budget),
         "options": options,
         "version": backend.version(),
         "configuration": _registry.configuration_of(backend)["train"],
     }
     work = _work_folder(out, asked, resumes=backend.CAPABILITIES.resumes)
-    report = Report(progress=progress, probe=_probe(scene, width) if curve and len(scene.test) else None)
+    report = Report(progress=progress, probe=_probe(scene, job.width) if job.curve and len(scene.test) else None)
     try:
-        trained = backend.train(data, work / "model", cell_seed, budget, options, report)
+        trained = backend.train(data, work / "model", cell_seed, job.budget, options, report)
     except (UserError, MemoryError) as error:
         for log in (work / "model").glob("*.log"):
             log.replace(out / log.name)  # what an external program said outlives its failure
         shutil.rmtree(work, ignore_errors=True)
         if isinstance(error, MemoryError):
-            raise UserError(f"backend '{backend_name}' ran out of memory with {len(indices)} views") from None
+            raise UserError(f"backend '{job.backend}' ran out of memory with {len(indices)} views") from None
         raise
     taken = next((file.name for file in (work / "model").iterdir() if file.name in OURS), None)
     if taken is not None:
         shutil.rmtree(work, ignore_errors=True)
-        raise UserError(f"backend '{backend_name}' left a file '{taken}', a name of viewbench's own; rename it")
+        raise UserError(f"backend '{job.backend}' left a file '{taken}', a name of viewbench's own; rename it")
     record = _record(trained, asked, selection, sha256_folder(work / "model"))
     _replace_model(work / "model", out)
     write_json(out / "selection.json", sealed(selection))
@@ -209,7 +204,7 @@ def _record(
         "peak_rss_bytes": max(peak_rss_bytes(), trained.peak_rss_bytes or 0),
         "peak_gpu_bytes": trained.peak_gpu_bytes,
         "n_primitives": trained.n_primitives,
-        "seeding": trained.seeding,
+        "seeding": dataclasses.asdict(trained.seeding),
         "curve": trained.curve,
         "scene": asked["scene"],
         **{key: asked[key] for key in ("scene_sha256", "holdout", "selection_sha256", "code_sha256", "configuration")},

@@ -25,6 +25,11 @@ import numpy as np
 
 from ..scenes.types import Cameras, Points
 
+# Options that mean the same for every backend that has them, so that a line of a study holds for all: where a training
+# starts (a source of _points; str), how many primitives there may be (int), the degree of the spherical harmonics
+# (int), and the grey level behind everything, from 0 for black to 1 for white (float).
+SHARED = {"points": str, "gaussians": int, "sh_degree": int, "background": float}
+
 
 @dataclass(frozen=True)
 class Capabilities:
@@ -60,6 +65,18 @@ class Budget:
     seconds: float | None = None
 
 
+@dataclass(frozen=True)
+class Job:
+    """One training: with which backend, for how long, at which size."""
+
+    backend: str
+    seed: int
+    budget: Budget
+    width: int | None = None  # pixels that images are resized to; None keeps them
+    options: dict[str, Any] = field(default_factory=dict)  # of the backend; those left out have their defaults
+    curve: bool = True  # whether a few test views are scored on the way
+
+
 # probe(render) -> mean test PSNR in dB of a few test views: `render` maps Cameras to images. The time it takes is
 # not the backend's. None where no curve is wanted.
 Probe = Callable[[Callable[[Cameras], Iterator[np.ndarray]]], float]
@@ -74,13 +91,35 @@ class Report:
 
 
 @dataclass(frozen=True)
+class Seeding:
+    """What a training started from, `seeding` of `train.json`: of one shape for every backend.
+
+    Numbers count points, those of views and depths apart. A backend that starts from nothing leaves it as it is.
+    """
+
+    points: str = "none"  # the source that was asked for: see _points
+    source: str = "none"  # what they are: "scene and sweep"
+    count: int = 0  # of all, those of the shell too
+    of: int = 0  # how many the scene has
+    scene_points: int = 0
+    sweep_points: int = 0  # at depths that a plane sweep is sure of,
+    guessed_points: int = 0  # and of pixels beside them
+    ray_points: int = 0
+    random_points: int = 0
+    shell_points: int = 0  # on a sphere around everything
+    sweep_views: int = 0  # that have a sure depth
+    sweep_depths: int = 0  # that are sure
+    fallback: str = ""  # why it was not as asked
+
+
+@dataclass(frozen=True)
 class Trained:
     """What `train.json` records of a training run, besides what the caller knows itself."""
 
     iterations: int
     seconds: float  # wall time of training: set-up (reading, compiling) and probes are not in it
     n_primitives: int | None = None
-    seeding: dict[str, Any] = field(default_factory=dict)  # where the starting points came from, and how many
+    seeding: Seeding = Seeding()
     curve: list[dict[str, float | None]] = field(default_factory=list)  # step, seconds, loss, test_psnr_db
     device: str = "cpu"
     threads: int = 1

@@ -20,8 +20,9 @@ from ..scenes.image_files import is_file
 from ..scenes.types import Cameras
 from . import _process, _subset
 from ._ply_render import ply_renderer, render_ply  # no source: training does not draw
-from ._seeding import SOURCES, seed_points
-from ._types import Budget, Capabilities, Report, Trained, TrainingSet
+from ._points import SOURCES, WITHOUT, Wanted, knowing, starting_points
+from ._surroundings import surroundings
+from ._types import Budget, Capabilities, Report, Seeding, Trained, TrainingSet
 
 LOG = "command.log"
 SCENE = "scene"  # the subset, inside the model folder while the program trains
@@ -31,8 +32,6 @@ OUTPUT_PLACES = ("name", "index", "out", "iterations")
 RECORD = "command.json"  # what rendering has to know of the training
 VERSION_SECONDS = 60.0
 LONGEST_NAME = 4096  # of a path; more is a script in the command line
-POINTS_OFF = "none"
-RANDOM_POINTS = 100_000  # as the 3DGS authors draw where a scene has none
 
 PLY_RENDERERS = ("backends._ply_render", "backends.gsplat", "backends.splat")
 
@@ -190,15 +189,19 @@ class External:
     def _what(self) -> str:
         return f"command:{self.name}"
 
-    def _points(self, data: TrainingSet, source: str, seed: int) -> tuple[Any, dict[str, Any]]:
+    def _points(self, data: TrainingSet, source: str, seed: int) -> tuple[Any, Seeding]:
         """Points for the scene that the program gets; a scene without any is none of its business."""
-        if source == POINTS_OFF or (source == "scene" and data.points is None):
-            return None, {"points": POINTS_OFF, "count": 0}
+        if source == WITHOUT or (source == "scene" and data.points is None):
+            return None, Seeding()
         if source not in SOURCES:
-            known = (*SOURCES, POINTS_OFF)
+            known = (*SOURCES, WITHOUT)
             raise UserError(f"{self._what}: option 'points' is '{source}'{nearest(source, known)} ({', '.join(known)})")
-        xyz, rgb, record = seed_points(data, source, np.random.default_rng(seed), RANDOM_POINTS)
-        return (xyz, rgb), record
+        data = knowing(data, source)
+        around = surroundings(data.training, data.points)
+        starts, seeding = starting_points(data, Wanted(source), around, np.random.default_rng(seed))
+        xyz = np.concatenate([start.points for start in starts])
+        colours = np.concatenate([start.colours for start in starts])
+        return (xyz, np.round(255 * colours).astype(np.uint8)), seeding
 
 
 def _check(entry: Command, where: str) -> None:

@@ -109,7 +109,6 @@ class InstantNgp:
         return Trained(
             iterations=record["iterations"],
             seconds=record["seconds"],
-            seeding={"points": "none", "count": 0},
             curve=[{**point, "test_psnr_db": None} for point in record["curve"]],
             device="cuda",
             peak_rss_bytes=usage.rss_bytes,

@@ -11,7 +11,7 @@ import numpy as np
 from .. import __version__
 from ..common import plugins
 from ..common.errors import UserError, nearest
-from ..common.seeding import generator
+from ..common.rng import generator
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
 from ..scenes.types import Scene, Split

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..backends import _registry
 from ..backends._train import all_options
+from ..backends._types import SHARED
 from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import Settings
@@ -187,6 +188,9 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
         if backend.iterations is None and backend.seconds is None:
             raise UserError(f"study '{path}': backend '{backend.name}' has no budget; give iterations or seconds")
         _check_grid(backend, raw, [entry.name for entry in selectors], path)
+    for name in SHARED:
+        if name in raw and not any(name in backend.options for backend in backends):
+            raise UserError(f"study '{path}': '{name}' is set, and none of its backends has it; leave it out")
     for kind, entries in (("selector", selectors), ("backend", backends)):
         called = [entry.name for entry in entries]
         twice = next((name for name in called if called.count(name) > 1), None)
@@ -218,24 +222,24 @@ def _selector(entry: str | dict) -> SelectorEntry:
 def _backend(entry: str | dict, raw: dict, settings: Settings) -> BackendEntry:
     entry = {"backend": entry} if isinstance(entry, str) else entry
     budget = entry.get("budget", raw.get("budget", {}))
-    start = {"points": raw["points"]} if "points" in raw and _has_points(entry["backend"], settings) else {}
+    shared = {name: raw[name] for name in SHARED if name in raw and name in _options_of(entry["backend"], settings)}
     return BackendEntry(
         name=entry.get("name", entry["backend"].replace(":", "-")),
         backend=entry["backend"],
         iterations=budget.get("iterations"),
         seconds=budget.get("seconds"),
         width=entry.get("width", raw.get("width")),
-        options={**start, **entry.get("options", {})},
+        options={**shared, **entry.get("options", {})},
         grid=_grid(entry.get("grid", {})),
     )
 
 
-def _has_points(name: str, settings: Settings) -> bool:
-    """Whether a backend can be told where to start; False for one that is not there, which is answered elsewhere."""
+def _options_of(name: str, settings: Settings) -> dict[str, Any]:
+    """What a backend can be told; nothing for one that is not there, which is answered elsewhere."""
     try:
-        return "points" in _registry.load(name, settings).CAPABILITIES.options
+        return _registry.load(name, settings).CAPABILITIES.options
     except UserError:
-        return False
+        return {}
 
 
 def _grid(given: dict[str, Any]) -> dict[str, Any]:

@@ -15,11 +15,13 @@ from ...common.files import read_json, write_json
 from ...common.settings import Settings
 from ...scenes.types import Cameras
 from .. import _gaussian_ply
-from .._seeding import seed_points
+from .._points import DRAWN, Wanted, knowing, starting_points
+from .._surroundings import surroundings
 from .._types import Budget, Capabilities, Report, Trained, TrainingSet
 
 MODEL = "model.ply"
 RECORD = "model.json"
+STRATEGIES = ("default", "mcmc")
 REMEDY = "install a CUDA toolkit of torch's CUDA version, or a gsplat wheel built for this torch"
 NOT_COMPILED = f"gsplat's CUDA code is not compiled and no nvcc is here to do it; {REMEDY}"
 
@@ -36,11 +38,11 @@ class Gsplat:
         deterministic=False,  # the CUDA kernels add gradients up in no fixed order
         options={
             "strategy": "default",  # or "mcmc": 3DGS as Markov chain Monte Carlo
-            "points": "scene",  # or "selected", "random": see _seeding.py
-            "random_points": 100_000,
+            "points": "scene",  # or any other source of _points
+            "drawn_points": DRAWN,  # where the source is none of the scene's
+            "gaussians": 0,  # no growth once there are so many; 0: no limit for "default", 1,000,000 for "mcmc"
             "sh_degree": 3,
-            "background": "black",  # or "white", as the paper's authors train
-            "cap": 0,  # no growth once there are so many Gaussians; 0: none for "default", 1,000,000 for "mcmc"
+            "background": 0.0,  # grey level behind everything; 1 is white, as the paper's authors train
         },
     )
 
@@ -88,10 +90,12 @@ class Gsplat:
         from .trainer import Task, fit
 
         _check(options)
-        rng = np.random.default_rng(seed)
-        xyz, rgb, seeding = seed_points(data, options["points"], rng, options["random_points"])
-        task = Task(data, seed, budget, options, report)
-        gaussians, near, trained = fit(task, xyz, rgb, self.device, self.rasterizer())
+        data = knowing(data, options["points"])
+        around = surroundings(data.training, data.points)
+        wanted = Wanted(options["points"], options["gaussians"] or None, options["drawn_points"])
+        starts, seeding = starting_points(data, wanted, around, np.random.default_rng(seed))
+        task = Task(data, around, seed, budget, options, report)
+        gaussians, near, trained = fit(task, starts, self.device, self.rasterizer())
         _gaussian_ply.save(out / MODEL, gaussians)
         write_json(out / RECORD, {"background": options["background"], "near": near})
         return Trained(seeding=seeding, **trained)
@@ -127,12 +131,12 @@ def _compiler() -> bool:
 
 
 def _check(options: dict[str, Any]) -> None:
-    for option, known in (("strategy", ("default", "mcmc")), ("background", ("black", "white"))):
-        if options[option] not in known:
-            raise UserError(f"option '{option}' is '{options[option]}', expected {' or '.join(map(repr, known))}")
-    if not 0 <= options["sh_degree"] <= 3:
-        raise UserError(f"option 'sh_degree' is {options['sh_degree']}, expected 0 to 3")
-    for option, least in (("cap", 0), ("random_points", 1)):
+    if options["strategy"] not in STRATEGIES:
+        raise UserError(f"option 'strategy' is '{options['strategy']}', expected 'default' or 'mcmc'")
+    for option, most in (("sh_degree", 3), ("background", 1)):
+        if not 0 <= options[option] <= most:
+            raise UserError(f"option '{option}' is {options[option]}, expected 0 to {most}")
+    for option, least in (("gaussians", 0), ("drawn_points", 1)):
         if options[option] < least:
             raise UserError(f"option '{option}' is {options[option]}, expected {least} or more")
 

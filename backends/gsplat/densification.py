@@ -24,11 +24,11 @@ class Densification:
         def squeezed(step: int, least: int = 1) -> int:
             return max(least, round(step * steps / PAPER_STEPS))
 
-        self.kind, self.cap = options["strategy"], options["cap"]
+        self.kind, self.most = options["strategy"], options["gaussians"]
         shared = {"refine_start_iter": squeezed(500), "refine_every": squeezed(100, LEAST_REFINE)}
         self.strategy: Any
         if self.kind == "mcmc":
-            self.strategy = MCMCStrategy(cap_max=self.cap or MCMC_CAP, refine_stop_iter=squeezed(25_000), **shared)
+            self.strategy = MCMCStrategy(cap_max=self.most or MCMC_CAP, refine_stop_iter=squeezed(25_000), **shared)
             self.state = self.strategy.initialize_state()
         else:
             self.strategy = DefaultStrategy(
@@ -59,7 +59,7 @@ class Densification:
             )
 
     def _default_step(self, step: int, info: dict[str, Any]) -> None:
-        full = self.cap and len(self.params["means"]) >= self.cap
+        full = self.most and len(self.params["means"]) >= self.most
         self.strategy.grow_grad2d = math.inf if full else self.growth  # pruning goes on
         self.strategy.step_post_backward(self.params, self.optims, self.state, step, info, packed=False)
         if 0 < step < self.strategy.refine_stop_iter and step % self.strategy.reset_every == 0:

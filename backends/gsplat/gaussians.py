@@ -1,11 +1,10 @@
 """The Gaussians as gsplat's strategies want them: a dictionary of parameters and one optimizer each."""
 
-import math
-
 import numpy as np
 import torch
 
 from .._gaussian_ply import Gaussians
+from .._points import Start
 
 C0 = 0.28209479177387814  # the constant spherical harmonic, 1 / (2 √π): colour = 0.5 + C0 · coefficient
 NEIGHBOURS = 3
@@ -14,20 +13,24 @@ RATES = {"means": 1.6e-4, "scales": 5e-3, "quats": 1e-3, "opacities": 5e-2, "sh0
 MEANS_DECAY = 0.01
 # (opacity, scale relative to the distance of the neighbours) at the start, of 3DGS and of 3DGS-MCMC
 STARTS = {"default": (0.1, 1.0), "mcmc": (0.5, 0.1)}
+FAINT = {"guessed": 0.1, "ray": 0.03}  # opacity of points whose depth is guessed, so that they fade where it is wrong
 
 Parameters = dict[str, torch.nn.Parameter]
 Optimizers = dict[str, torch.optim.Optimizer]
 
 
-def starting(xyz: np.ndarray, rgb: np.ndarray, strategy: str, degree: int, extent: float) -> Gaussians:
-    """Round Gaussians at the seed points, as large as the root mean square distance of their three neighbours.
+def initial(starts: list[Start], strategy: str, degree: int, extent: float) -> Gaussians:
+    """Round Gaussians at the points, as large as the root mean square distance of their three neighbours.
 
-    xyz: (P, 3) scene units; rgb: (P, 3) uint8; extent: scene units, the size where a point has no neighbour.
+    extent: scene units, the size where a point has no neighbour.
     """
     from scipy.spatial import cKDTree
 
+    xyz = np.concatenate([start.points for start in starts])
+    colours = np.concatenate([start.colours for start in starts])
     count = len(xyz)
-    opacity, relative = STARTS[strategy]
+    own, relative = STARTS[strategy]
+    opacity = np.concatenate([np.full(len(start), min(own, FAINT.get(start.kind, own))) for start in starts])
     distances = np.full((count, 1), extent)
     if count > 1:
         distances = cKDTree(xyz).query(xyz, k=min(NEIGHBOURS + 1, count))[0][:, 1:]
@@ -36,8 +39,8 @@ def starting(xyz: np.ndarray, rgb: np.ndarray, strategy: str, degree: int, exten
         means=xyz.astype(np.float32),
         scales=np.repeat(np.log(relative * size)[:, None], 3, axis=1).astype(np.float32),
         quats=np.tile(np.array([1, 0, 0, 0], dtype=np.float32), (count, 1)),
-        opacities=np.full(count, math.log(opacity / (1 - opacity)), dtype=np.float32),
-        sh0=((rgb / 255 - 0.5) / C0).astype(np.float32),
+        opacities=np.log(opacity / (1 - opacity)).astype(np.float32),
+        sh0=((colours - 0.5) / C0).astype(np.float32),
         shn=np.zeros((count, (degree + 1) ** 2 - 1, 3), dtype=np.float32),
     )
 

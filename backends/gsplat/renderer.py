@@ -11,15 +11,14 @@ from .._gaussian_ply import Gaussians
 from .gaussians import Parameters, parameters
 
 NEAR = 0.01  # scene units, gsplat's own default
-BACKGROUNDS = {"black": 0.0, "white": 1.0}
 
 
 class Renderer:
-    """gsplat's rasterization on one device, over one background, from one near plane (scene units, 0: its default)."""
+    """gsplat's rasterization on one device, over a grey level in [0, 1], from a near plane (0: its own)."""
 
-    def __init__(self, rasterize: Callable, device: str, background: str, near: float):
+    def __init__(self, rasterize: Callable, device: str, background: float, near: float):
         self.rasterize, self.device = rasterize, device
-        self.background = torch.full((1, 3), BACKGROUNDS[background], device=device)
+        self.background = torch.full((1, 3), float(background), device=device)
         self.near = near or NEAR
 
     def parameters(self, gaussians: Gaussians) -> Parameters:

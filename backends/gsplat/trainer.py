@@ -10,15 +10,16 @@ import torch
 
 from ...common.errors import UserError
 from .._gaussian_ply import Gaussians
-from .._surroundings import NEAR_PLANE, surroundings
+from .._points import Start
+from .._surroundings import NEAR_PLANE, Surroundings
 from .._types import Budget, Report, TrainingSet
 from .densification import PAPER_STEPS, Densification
 from .gaussians import (
     MEANS_DECAY,
     Parameters,
     arrays,
+    initial,
     optimizers,
-    starting,
 )
 from .loss import loss
 from .renderer import Renderer
@@ -33,32 +34,29 @@ class Task:
     """What is to be trained, as the backend was asked."""
 
     data: TrainingSet
+    around: Surroundings
     seed: int
     budget: Budget
     options: dict[str, Any]
     report: Report
 
 
-def fit(
-    task: Task, xyz: np.ndarray, rgb: np.ndarray, device: str, rasterize: Callable
-) -> tuple[Gaussians, float, dict[str, Any]]:
-    """Trains from the points `xyz` (P, 3), `rgb` (P, 3) uint8; returns Gaussians, near plane and fields of `Trained`.
+def fit(task: Task, starts: list[Start], device: str, rasterize: Callable) -> tuple[Gaussians, float, dict[str, Any]]:
+    """Trains from the points; returns Gaussians, near plane in scene units and fields of `Trained`.
 
     A run limited by seconds alone follows the schedule of 30,000 steps as far as it gets.
     Raises UserError when the device's memory is full.
     """
     torch.manual_seed(task.seed)
-    data, options = task.data, task.options
-    around = surroundings(data.training, None if options["points"] == "random" else data.points)
-    extent = around.extent
-    renderer = Renderer(rasterize, device, options["background"], NEAR_PLANE * around.nearest)
-    params = renderer.parameters(starting(xyz, rgb, options["strategy"], options["sh_degree"], extent))
+    data, options, extent = task.data, task.options, task.around.extent
+    renderer = Renderer(rasterize, device, options["background"], NEAR_PLANE * task.around.nearest)
+    params = renderer.parameters(initial(starts, options["strategy"], options["sh_degree"], extent))
     try:
         run = _run(task, params, extent, renderer)
     except torch.cuda.OutOfMemoryError:
         raise UserError(
             f"the GPU's memory is full with {len(params['means'])} Gaussians and {len(data.names)} views of "
-            f"{data.cameras.width[0]} pixels width; train at a smaller width, or set a smaller cap on them"
+            f"{data.cameras.width[0]} pixels width; train at a smaller width, or set gaussians to fewer"
         ) from None
     used = torch.cuda.get_device_name(device) if device.startswith("cuda") else device
     found = {"n_primitives": len(params["means"]), "device": used, "threads": torch.get_num_threads()}

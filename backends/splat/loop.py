@@ -10,14 +10,15 @@ import numpy as np
 from ...common.errors import UserError
 from ...common.files import write_json
 from ...scenes.types import Cameras
+from .._points import knowing
 from .._surroundings import surroundings
 from .._types import Budget, Report, Trained, TrainingSet
 from . import layout, ply
 from .engine import Engine
+from .initial import initial
 from .options import Options, Rendering
 from .projection import camera_vectors
 from .relocate import relocate
-from .seeding import known_points, seed
 from .snapshot import State
 from .stages import Stage, halved
 
@@ -27,7 +28,7 @@ SNAPSHOT_S = 10.0
 CHECK_EVERY = 20  # steps between looks at the clock
 
 
-def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dict, report: Report) -> Trained:
+def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict, report: Report) -> Trained:
     """Trains on the chosen views and writes out/model.ply; takes up the snapshot of a killed run that it finds there.
 
     Raises UserError for views that cannot be trained on and for a training that diverged.
@@ -35,14 +36,14 @@ def train(data: TrainingSet, out: Path, seed_: int, budget: Budget, options: dic
     entered = time.perf_counter()
     o = Options(**options)
     _check(data)
-    data = dataclasses.replace(data, points=known_points(data, o.points))
+    data = knowing(data, o.points)
     around = surroundings(data.training, data.points)
     views = len(data.images)
-    rng = np.random.default_rng(seed_)
-    gaussians, seeding = seed(data, o, around, rng)
-    if views < 2 and not seeding["scene_points"]:
+    rng = np.random.default_rng(seed)
+    gaussians, seeding = initial(data, o, around, rng)
+    if views < 2 and not seeding.scene_points:
         raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
-    rendering = Rendering(o.near * around.nearest, o.background, o.degree, o.low_pass, o.antialias)
+    rendering = Rendering(o.near * around.nearest, o.background, o.sh_degree, o.low_pass, o.antialias)
     full = Stage(data.images, data.cameras, gaussians.shape[1], rendering)
     coarse = halved(data, gaussians.shape[1], rendering) if o.coarse else None
     first_rates, last = _rates(o, around.extent)
@@ -147,7 +148,7 @@ def _share(step: int, seconds: float, budget: Budget) -> float:
 
 def _rates(o: Options, extent: float) -> tuple[np.ndarray, np.ndarray]:
     """Rates per row at the start, and the factor to which each falls."""
-    rates = np.zeros(layout.rows(o.degree))
+    rates = np.zeros(layout.rows(o.sh_degree))
     last = np.full(len(rates), o.rate_end)
     rates[layout.MEAN : layout.MEAN + 3] = o.rate_mean * extent
     last[layout.MEAN : layout.MEAN + 3] = o.rate_mean_end

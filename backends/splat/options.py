@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from ...common.errors import UserError
+from .._points import SWEEP
 from .._surroundings import NEAR_PLANE
 
 
@@ -15,10 +16,10 @@ class Options:
     """
 
     gaussians: int = 28000  # most primitives; points beyond it are sampled
-    points: str = "auto"  # where they start: auto, scene, selected, sweep, rays
-    sweep: float = 0.3  # share of them that the plane sweep gives where the scene has points too
+    points: str = "auto"  # where they start: auto, scene, selected, sweep, rays, random
+    sweep: float = SWEEP  # share of them that the plane sweep gives where the scene has points too
     shell: int = 500  # of them lie on a sphere around everything
-    degree: int = 1  # of spherical harmonics
+    sh_degree: int = 1  # of spherical harmonics
     opacity: float = 0.4  # at the start, where the points are known
     scale: float = 0.45  # at the start, times the spacing of the points
     low_pass: float = 0.1  # pixels², variance of the filter on the screen
@@ -38,7 +39,7 @@ class Options:
     relocate_every: int = 100
     relocate_until: float = 0.85  # share of the budget; 0 never relocates
     near: float = NEAR_PLANE  # near plane, share of the depth that next to nothing is nearer than
-    background: float = 0.0  # grey level behind everything
+    background: float = 0.0  # grey level behind everything, 1 is white
 
     def __post_init__(self) -> None:
         for name, (low, high) in LIMITS.items():
@@ -50,7 +51,7 @@ LIMITS = {
     "gaussians": (1, 10_000_000),
     "sweep": (0, 1),
     "shell": (0, 100_000),
-    "degree": (0, 3),
+    "sh_degree": (0, 3),
     "opacity": (0.005, 0.99),
     "scale": (1e-3, 1e3),
     "low_pass": (0, 100),

@@ -9,11 +9,11 @@ import math
 import numpy as np
 
 from ...scenes.types import Cameras
+from .._shrink import cameras_shrunk, images_shrunk
 from .._types import TrainingSet
 from .engine import Engine
 from .options import Rendering
 from .projection import camera_vectors
-from .shrink import cameras_shrunk, images_shrunk
 
 SMALLEST = 80  # pixels: geometric mean of the sides that halved pictures must have
 

@@ -3,10 +3,10 @@
 import numpy as np
 
 from ...scenes.types import Cameras
+from .._points.plane_sweep import sweep
 from . import layout
 from .engine import Engine
 from .options import Rendering
-from .plane_sweep import sweep
 from .projection import camera_vectors
 
 

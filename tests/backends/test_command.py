@@ -9,7 +9,7 @@ import pytest
 
 from tests.backends.conftest import nearest_command, settings_with
 from viewbench.backends import _registry
-from viewbench.backends._types import Budget, Report
+from viewbench.backends._types import Budget, Report, Seeding
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.common.settings import PACKAGE
@@ -55,14 +55,14 @@ def test_the_program_sees_the_chosen_views_and_no_name_of_theirs(take_views, tmp
     printed = (tmp_path / "m" / "command.log").read_text()
     assert printed.splitlines()[0].endswith("scene 5 --w=48 3")
     assert printed.splitlines()[1] == "00000.png 00001.png 00002.png images points3d.ply transforms.json"
-    assert trained.seeding == {"points": "scene", "count": 200, "of": 200}
+    assert trained.seeding == Seeding(points="scene", source="scene", count=200, of=200, scene_points=200)
 
 
 @pytest.mark.parametrize(("source", "count"), [("none", 0), ("random", 100_000)])
 def test_the_points_of_all_views_can_be_kept_from_the_program(take_views, tmp_path, source, count):
     code = "import pathlib, sys; print(pathlib.Path(sys.argv[1], 'points3d.ply').exists()); open('model', 'w')"
     trained = train(load(train=[*python(code), "{scene}"]), take_views(), tmp_path / "m", options={"points": source})
-    assert trained.seeding["count"] == count
+    assert trained.seeding.count == count
     assert (tmp_path / "m" / "command.log").read_text().strip() == str(count > 0)
 
 

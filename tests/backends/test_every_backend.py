@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from tests.backends.conftest import make_checkout, nearest_command, settings_wit
 from viewbench.backends import _registry
 from viewbench.backends._psnr import psnr_db
 from viewbench.backends._train import WORK, train
-from viewbench.backends._types import Budget
+from viewbench.backends._types import SHARED, Budget, Job, Seeding
 from viewbench.common.errors import UserError
 from viewbench.common.settings import InstantNgp, Settings
 from viewbench.scenes.images import load_images
@@ -61,8 +61,8 @@ def train_cell(settings):
     """Trains three views of a scene for a few steps."""
 
     def run(scene: Scene, name: str, out: Path, budget: Budget | None = None, **more) -> dict:
-        arguments = {"settings": settings, "seed": 0, "width": WIDTH, "curve": False, **more}
-        return train(scene, selection_of(scene), name, out, budget=budget or Budget(iterations=20), **arguments)
+        job = Job(name, budget=budget or Budget(iterations=20), **{"seed": 0, "width": WIDTH, "curve": False, **more})
+        return train(scene, selection_of(scene), job, out, settings=settings)
 
     return run
 
@@ -81,6 +81,20 @@ def test_three_views_are_learnt(scene, name, backend, tmp_path, train_cell):
     assert record == json.loads((tmp_path / "m" / "train.json").read_text())
     assert (record["backend"], record["count"], record["width"]) == (name, 3, WIDTH)
     assert record["version"]
+
+
+def test_words_that_backends_share_mean_the_same(backend):
+    for option, kind in SHARED.items():
+        if option in backend.CAPABILITIES.options:
+            assert type(backend.CAPABILITIES.options[option]) is kind
+
+
+def test_where_it_started_is_recorded_in_one_shape(scene, name, tmp_path, train_cell):
+    record = train_cell(scene, name, tmp_path / "m")["seeding"]
+    assert set(record) == {item.name for item in fields(Seeding)}
+    kinds = [record[f"{kind}_points"] for kind in ("scene", "sweep", "guessed", "ray", "random", "shell")]
+    assert record["count"] == sum(kinds)
+    assert (record["source"] == "none") == (record["count"] == 0)
 
 
 def test_renders_have_the_size_of_their_cameras_and_colours_between_0_and_1(scene, name, backend, tmp_path, train_cell):
@@ -128,7 +142,7 @@ def test_impossible_requests_are_refused_in_one_line(scene, name, backend, tmp_p
             train_cell(scene, name, tmp_path / "m", options=options)
         assert "\n" not in str(caught.value)
     with pytest.raises(UserError, match="distinct and in"):
-        train(scene, wrong, name, tmp_path / "m", settings=settings, seed=0, budget=Budget(iterations=3), width=WIDTH)
+        train(scene, wrong, Job(name, 0, Budget(iterations=3), WIDTH), tmp_path / "m", settings=settings)
     assert not (tmp_path / "m" / "train.json").exists()
     assert not (tmp_path / "m" / WORK).exists()
 
@@ -147,9 +161,9 @@ def test_no_test_image_is_read_while_training(small_room, name, tmp_path, train_
 def test_the_log_of_a_program_that_fails_is_kept(scene, tmp_path):
     code = "print('reading'); print('cannot go on'); raise SystemExit(1)"
     failing = settings_with(x=nearest_command(train=[sys.executable, "-c", code, "{iterations}"]))
-    arguments = {"settings": failing, "seed": 0, "budget": Budget(iterations=3), "width": WIDTH}
+    job = Job("command:x", 0, Budget(iterations=3), WIDTH)
     with pytest.raises(UserError, match="exit status 1: cannot go on"):
-        train(scene, selection_of(scene), "command:x", tmp_path / "m", **arguments)
+        train(scene, selection_of(scene), job, tmp_path / "m", settings=failing)
     (log,) = (tmp_path / "m").iterdir()
     assert (log.name, log.read_text().split("\n")[0]) == ("command.log", "reading")
 

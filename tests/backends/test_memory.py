@@ -11,7 +11,7 @@ import pytest
 
 from tests.backends.conftest import nearest_command, settings_with
 from viewbench.backends import _memory, _process, _train
-from viewbench.backends._types import Budget
+from viewbench.backends._types import Budget, Job
 from viewbench.common.errors import UserError
 from viewbench.common.settings import load as load_settings
 from viewbench.scenes.load import open_scene
@@ -49,8 +49,8 @@ def test_the_record_of_a_training_has_it(small_room, tmp_path):
     chosen = {"indices": [0, 4], "names": names, "n_views": len(scene.train), "selector": "random", "seed": 0}
     program = [sys.executable, "-c", PARENT + "\nopen('kept', 'w')\n", "{out}", "{iterations}"]
     settings = settings_with(large=nearest_command(train=program))
-    asked = {"settings": settings, "seed": 0, "budget": Budget(3), "width": 48}
-    record = _train.train(scene, chosen, "command:large", tmp_path, **asked)
+    job = Job("command:large", 0, Budget(3), 48)
+    record = _train.train(scene, chosen, job, tmp_path, settings=settings)
     assert record["peak_rss_bytes"] > 300 * MIB
     assert record["peak_gpu_bytes"] is None
 

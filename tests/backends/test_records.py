@@ -9,7 +9,7 @@ import pytest
 
 from tests.backends.conftest import nearest_command, settings_with
 from viewbench.backends import _evaluate, _train
-from viewbench.backends._types import Budget
+from viewbench.backends._types import Budget, Job
 from viewbench.common.errors import UserError
 from viewbench.common.files import sha256_file, sha256_folder, unsealed
 from viewbench.common.settings import load as load_settings
@@ -19,13 +19,13 @@ from viewbench.selectors import _run
 from viewbench.selectors._selection import selection_sha256
 
 SETTINGS = load_settings()
+JOB = Job("splat", 0, Budget(4), 48, curve=False)
 
 
 def trained(folder, out, **changes):
     scene = open_scene(str(folder), SETTINGS)
     chosen = _run.run(scene, "uniform", 3, 0)
-    arguments = {"settings": SETTINGS, "seed": 0, "budget": Budget(4), "width": 48, "curve": False, **changes}
-    return scene, chosen, _train.train(scene, chosen, "splat", out, **arguments)
+    return scene, chosen, _train.train(scene, chosen, dataclasses.replace(JOB, **changes), out, settings=SETTINGS)
 
 
 def test_each_file_names_what_was_before_it(small_room, tmp_path):
@@ -96,8 +96,7 @@ def test_another_choice_of_as_many_views_is_another_run(small_room, tmp_path):
     first = trained(small_room, tmp_path / "a")[2]
     scene = open_scene(str(small_room), SETTINGS)
     other = _run.run(scene, "maxmin", 3, 5, {"factors": ["pos"]})
-    arguments = {"settings": SETTINGS, "seed": 0, "budget": Budget(4), "width": 48, "curve": False}
-    second = _train.train(scene, other, "splat", tmp_path / "b", **arguments)
+    second = _train.train(scene, other, JOB, tmp_path / "b", settings=SETTINGS)
     assert first["selection_sha256"] != second["selection_sha256"]
 
 
@@ -109,8 +108,8 @@ def test_nothing_of_an_older_model_is_left_to_be_drawn(small_room, tmp_path):
     def train(file):
         code = f"import sys, pathlib; pathlib.Path(sys.argv[1], 'deep').mkdir(); open(sys.argv[1] + '/{file}', 'w')"
         command = nearest_command(train=[sys.executable, "-c", code, "{out}", "{iterations}"])
-        asked = {"settings": settings_with(x=command), "seed": 0, "budget": Budget(4), "width": 48}
-        return _train.train(scene, chosen, "command:x", tmp_path, curve=False, **asked)
+        job = dataclasses.replace(JOB, backend="command:x")
+        return _train.train(scene, chosen, job, tmp_path, settings=settings_with(x=command))
 
     train("cloud.ply")
     (tmp_path / "mine.txt").write_text("of the user's own")

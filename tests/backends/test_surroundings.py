@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from viewbench.backends import _train
+from viewbench.backends._points import knowing
 from viewbench.backends._surroundings import GUESSED_FAR, surroundings
-from viewbench.backends._types import Budget
-from viewbench.backends.splat import seeding
+from viewbench.backends._types import Budget, Job
+from viewbench.backends.splat.initial import initial
 from viewbench.backends.splat.options import Options
 from viewbench.common.settings import load as load_settings
 from viewbench.scenes.load import open_scene
@@ -72,16 +73,15 @@ def test_a_long_path_does_not_move_the_near_plane_as_far_as_it_is_long(take_view
     assert surroundings(longer, points).nearest < 3
 
 
-@pytest.mark.parametrize("source", ["sweep", "rays"])
+@pytest.mark.parametrize("source", ["sweep", "rays", "random"])
 def test_a_start_without_points_sees_none_of_them(take_views, source):
     """The scene's points moved away change nothing that a sweep or rays find: not even the range of depths."""
     data = take_views(tuple(range(0, 400, 20)))
     o = Options(points=source, gaussians=2000)
 
     def start(points):
-        known = seeding.known_points(replace(data, points=points), source)
-        seen = replace(data, points=known)
-        return seeding.seed(seen, o, surroundings(data.training, known), np.random.default_rng(0))[0]
+        seen = knowing(replace(data, points=points), source)
+        return initial(seen, o, surroundings(data.training, seen.points), np.random.default_rng(0))[0]
 
     moved = Points(data.points.xyz * 100, data.points.rgb)
     assert np.array_equal(start(data.points), start(moved))
@@ -92,21 +92,17 @@ def test_the_scene_points_that_are_drawn_are_the_same_for_every_choice(small_roo
     """Half of the points fit: which of them must not depend on the views or on who chose them."""
     scene, settings = open_scene(str(small_room), load_settings()), load_settings()
     drawn = []
-    real = seeding.seed
 
     def spy(data, o, known, rng):
-        gaussians, record = real(data, o, known, rng)
-        drawn.append(gaussians[:3, : record["scene_points"]].tobytes())
+        gaussians, record = initial(data, o, known, rng)
+        drawn.append(gaussians[:3, : record.scene_points].tobytes())
         return gaussians, record
 
-    monkeypatch.setattr("viewbench.backends.splat.loop.seed", spy)
+    monkeypatch.setattr("viewbench.backends.splat.loop.initial", spy)
     choices = [("random", [0, 4]), ("maxmin", [1, 5, 9]), ("full", list(range(12)))]
     for number, (selector, indices) in enumerate(choices):
         names = [scene.train.names[i] for i in indices]
         chosen = {"indices": indices, "names": names, "n_views": 12, "selector": selector, "seed": number}
-        options = {"gaussians": 900, "points": "scene"}
-        _train.train(
-            scene, chosen, "splat", tmp_path / str(number), settings=settings, seed=3, budget=Budget(1), width=48,
-            options=options, curve=False,
-        )  # fmt: skip
+        job = Job("splat", 3, Budget(1), 48, {"gaussians": 900, "points": "scene"}, curve=False)
+        _train.train(scene, chosen, job, tmp_path / str(number), settings=settings)
     assert len(set(drawn)) == 1

@@ -38,8 +38,8 @@ SETTINGS = {
     "rays": "points:rays",
     "no shell": "shell:0",
     "3DGS's filter": "low_pass:0.3,antialias:false",
-    "degree 0": "degree:0",
-    "degree 2": "degree:2",
+    "degree 0": "sh_degree:0",
+    "degree 2": "sh_degree:2",
     "regularised": "opacity_weight:0.01,scale_weight:0.01",
 }
 VALIDATION_VIEWS = 50

@@ -9,7 +9,7 @@ import yaml
 from tests.conftest import ROOM
 from tests.workflow.clones import take_frames
 from viewbench.backends import _evaluate, _train
-from viewbench.backends._types import Budget
+from viewbench.backends._types import Budget, Job
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.common.files import read_json, sealed, write_json
@@ -45,8 +45,8 @@ def place(tmp_path, monkeypatch):
     save(results / "features" / "walk.npy", features)
     chosen = _run.run(scene, "maxmin", 3, 4, {"sigma": 0.4}, features)
     folder = results / "cells" / "splat" / "walk" / "maxmin" / "0.3" / "4"
-    asked = {"settings": settings, "seed": 4, "budget": Budget(2), "width": 48, "options": {"gaussians": 600}}
-    _train.train(scene, chosen, "splat", folder, curve=False, **asked)
+    job = Job("splat", 4, Budget(2), 48, {"gaussians": 600}, curve=False)
+    _train.train(scene, chosen, job, folder, settings=settings)
     _evaluate.evaluate(folder, scene, folder, settings=settings)
     return tmp_path
 

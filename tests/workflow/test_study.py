@@ -56,6 +56,15 @@ def test_a_backend_may_run_a_part_of_the_grid(load):
         load(backends=[{"backend": "splat", "grid": {"selectors": ["coverge"]}}])
 
 
+def test_words_that_backends_share_are_set_in_one_line(load):
+    study = load(backends=["splat", "gsplat", "instant-ngp"], background=0.5, sh_degree=0, gaussians=900)
+    one, other, none = (entry.options for entry in study.backends)
+    assert one == other == {"background": 0.5, "sh_degree": 0, "gaussians": 900}
+    assert none == {}
+    with pytest.raises(UserError, match="'background' is set, and none of its backends has it"):
+        load(backends=["instant-ngp"], background=0.5)
+
+
 def test_one_line_chooses_the_start_of_every_trainer_that_can_be_told(load):
     other = {"name": "told", "backend": "splat", "options": {"points": "rays"}}
     study = load(backends=["splat", other, "instant-ngp"], points="sweep")

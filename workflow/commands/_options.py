@@ -1,20 +1,20 @@
 """Options that several commands share, and the way they show progress."""
 
+import functools
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ...common.errors import UserError
 
-scene_argument = click.argument("scene")
-format_option = click.option("--format", "format_", metavar="NAME", help="Force a reader (viewbench list formats).")
-holdout_option = click.option(
-    "--holdout", metavar="RULE", help="Test split where the capture has none: every:8, blocks:8 or none."
-)
-outside_option = click.option("--allow-outside", is_flag=True, help="Let transforms name images outside the folder.")
+if TYPE_CHECKING:
+    from ...common.settings import Settings
+    from ...scenes.types import Scene
+
 encoder_option = click.option("--encoder", metavar="NAME", help="Image encoder (viewbench list encoders).")
 count_rule_option = click.option(
     "--count-rule",
@@ -25,14 +25,44 @@ count_rule_option = click.option(
 out_option = click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder to write.")
 
 
-def open_scene(name: str, settings: Any, **options: Any) -> Any:
-    """As `scenes.load.open_scene`; says on stderr what the reader dropped or assumed."""
-    from ...scenes.load import open_scene as opened
+@dataclass(frozen=True)
+class Capture:
+    """A scene as it was named on the command line."""
 
-    scene = opened(name, settings, **options)
-    for note in scene.notes:
-        print(f"viewbench: {scene.name}: {note}", file=sys.stderr)
-    return scene
+    name: str
+    format: str | None
+    holdout: str | None
+    allow_outside: bool
+
+    def open(self, settings: "Settings", notes: bool = True) -> "Scene":
+        """The scene; what its reader dropped or assumed is said on stderr unless `notes` is False."""
+        from ...scenes.load import open_scene
+
+        options = {"format": self.format, "holdout": self.holdout, "allow_outside": self.allow_outside}
+        scene = open_scene(self.name, settings, **options)
+        for note in scene.notes if notes else ():
+            print(f"viewbench: {scene.name}: {note}", file=sys.stderr)
+        return scene
+
+
+SCENE = (
+    click.argument("scene"),
+    click.option("--format", "format_", metavar="NAME", help="Force a reader (viewbench list formats)."),
+    click.option("--holdout", metavar="RULE", help="Test split where the capture has none: every:8, blocks:8 or none."),
+    click.option("--allow-outside", is_flag=True, help="Let transforms name images outside the folder."),
+)
+
+
+def scene_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Argument SCENE and what goes with it, handed to the command as one `Capture` called `scene`."""
+
+    @functools.wraps(command)
+    def wrapped(scene: str, format_: str | None, holdout: str | None, allow_outside: bool, **given: Any) -> None:
+        command(scene=Capture(scene, format_, holdout, allow_outside), **given)
+
+    for option in reversed(SCENE):
+        wrapped = option(wrapped)
+    return wrapped
 
 
 def settings_of(values: tuple[str, ...]) -> dict[str, Any]:

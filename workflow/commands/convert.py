@@ -8,23 +8,17 @@ from . import _options
 
 
 @click.command()
-@_options.scene_argument
 @_options.out_option
 @click.option("--to", required=True, metavar="FORMAT", help="Format to write: transforms or colmap.")
 @click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
-@_options.format_option
-@_options.holdout_option
-@_options.outside_option
+@_options.scene_options
 def command(
-    scene: str,
+    scene: _options.Capture,
     out: Path,
     to: str,
     copy: bool,
     force: bool,
-    format_: str | None,
-    holdout: str | None,
-    allow_outside: bool,
 ) -> None:
     """Write all views of SCENE to --out in the format --to."""
     import numpy as np
@@ -32,9 +26,7 @@ def command(
     from ...common import settings as settings_file
     from ...scenes.subset import write_scene
 
-    opened = _options.open_scene(
-        scene, settings_file.load(), format=format_, holdout=holdout, allow_outside=allow_outside
-    )
+    opened = scene.open(settings_file.load())
     write_scene(opened, np.arange(len(opened.train)), out, to, copy, force)
     if to == "colmap" and opened.points is None:
         click.echo("viewbench: the scene has no points; nerfstudio's and gsplat's COLMAP readers want some", err=True)

@@ -10,26 +10,20 @@ SAMPLE = 5000  # points kept for the figures
 
 
 @click.command()
-@_options.scene_argument
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="JSON file to write.")
 @click.option("--width", type=click.IntRange(min=16), help="Also write the test images at this width beside it.")
-@_options.format_option
-@_options.holdout_option
-@_options.outside_option
-def command(
-    scene: str, out: Path, width: int | None, format_: str | None, holdout: str | None, allow_outside: bool
-) -> None:
+@_options.scene_options
+def command(scene: _options.Capture, out: Path, width: int | None) -> None:
     """Write positions and viewing directions of both splits of SCENE as JSON."""
     import numpy as np
 
     from ...common import settings as settings_file
     from ...common.files import write_json
     from ...scenes.digest import scene_sha256
-    from ...scenes.load import open_scene
     from ...scenes.types import Split
 
     settings = settings_file.load()
-    opened = open_scene(scene, settings, format=format_, holdout=holdout, allow_outside=allow_outside)
+    opened = scene.open(settings, notes=False)
 
     def split(part: Split) -> dict:
         return {
@@ -47,7 +41,7 @@ def command(
     record = {
         "schema": 1,
         "scene": opened.name,
-        "dataset": settings.dataset_of(scene, opened.name),
+        "dataset": settings.dataset_of(scene.name, opened.name),
         "format": opened.format,
         "holdout": opened.holdout,
         "n_train": len(opened.train),

@@ -9,18 +9,15 @@ from . import _options
 
 @click.command()
 @click.argument("model", type=click.Path(path_type=Path))
-@_options.scene_argument
 @_options.out_option
-@_options.format_option
-@_options.holdout_option
-@_options.outside_option
-def command(model: Path, scene: str, out: Path, format_: str | None, holdout: str | None, allow_outside: bool) -> None:
+@_options.scene_options
+def command(model: Path, scene: _options.Capture, out: Path) -> None:
     """Render the test views of SCENE with the model in the folder MODEL; write metrics.json and the renders."""
     from ...backends._evaluate import evaluate
     from ...common import settings as settings_file
 
     settings = settings_file.load()
-    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout, allow_outside=allow_outside)
+    opened = scene.open(settings)
     record = evaluate(model, opened, out, settings=settings, progress=_options.progress("evaluate"))
     text = [f"{len(record['views'])} test views"]
     for metric, unit in (("psnr_db", " dB PSNR"), ("ssim", " SSIM"), ("lpips", " LPIPS")):

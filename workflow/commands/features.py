@@ -8,21 +8,16 @@ from . import _options
 
 
 @click.command()
-@_options.scene_argument
 @_options.encoder_option
 @click.option("--out", type=click.Path(path_type=Path), help="Also write them as N x D array to this .npy file.")
-@_options.format_option
-@_options.holdout_option
-@_options.outside_option
-def command(
-    scene: str, encoder: str | None, out: Path | None, format_: str | None, holdout: str | None, allow_outside: bool
-) -> None:
+@_options.scene_options
+def command(scene: _options.Capture, encoder: str | None, out: Path | None) -> None:
     """Embed the training views of SCENE; what is in the cache already is not embedded again."""
     from ...common import settings as settings_file
     from ...scenes import features
 
     settings = settings_file.load()
-    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout, allow_outside=allow_outside)
+    opened = scene.open(settings)
     name = encoder or settings.features.encoder
     cache, batch, device = Path(settings.features.cache), settings.features.batch, settings.compute.device
     rows = features.features(opened.train, name, cache, batch, _options.progress("features"), device)

@@ -9,7 +9,6 @@ from . import _options
 
 
 @click.command()
-@_options.scene_argument
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to write the chosen subset to.")
 @click.option("--selector", default="maxmin", show_default=True, help="Way of choosing (viewbench list selectors).")
 @click.option("--ratio", type=float, help="Share of the training views, in (0, 1].")
@@ -31,9 +30,7 @@ from . import _options
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the choice: .png, .pdf, .svg or .html (3D).")
 @click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
-@_options.format_option
-@_options.holdout_option
-@_options.outside_option
+@_options.scene_options
 def command(**given: Any) -> None:
     """Choose views of SCENE and write them to --out, in the format that was read, with selection.json."""
     import numpy as np
@@ -54,13 +51,7 @@ def command(**given: Any) -> None:
 
         kind_of(given["plot"])
     settings = settings_file.load()
-    scene = _options.open_scene(
-        given["scene"],
-        settings,
-        format=given["format_"],
-        holdout=given["holdout"],
-        allow_outside=given["allow_outside"],
-    )
+    scene = given["scene"].open(settings)
     check_present(scene)
     n = len(scene.train)
     count = given["count"] if given["ratio"] is None else count_of(given["ratio"], n, given["count_rule"])

@@ -1,6 +1,7 @@
 """Train one scene model on chosen views."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -8,7 +9,6 @@ from . import _options
 
 
 @click.command()
-@_options.scene_argument
 @click.option("--selection", type=click.Path(path_type=Path), required=True, help="selection.json of viewbench select.")
 @click.option("--ratio", type=float, help="Take the first views of the selection only: this share of all.")
 @click.option("--count", type=int, help="Take so many of its first views, instead of --ratio.")
@@ -20,26 +20,8 @@ from . import _options
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Stop after so long, set-up not counted.")
 @click.option("--width", type=click.IntRange(min=16), help="Resize images to so many pixels; else as they are.")
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Option of the backend; repeatable.")
-@_options.format_option
-@_options.holdout_option
-@_options.outside_option
-def command(
-    scene: str,
-    selection: Path,
-    ratio: float | None,
-    count: int | None,
-    count_rule: str,
-    backend: str,
-    out: Path,
-    seed: int,
-    iterations: int | None,
-    seconds: float | None,
-    width: int | None,
-    options: tuple[str, ...],
-    format_: str | None,
-    holdout: str | None,
-    allow_outside: bool,
-) -> None:
+@_options.scene_options
+def command(**given: Any) -> None:
     """Train one model on the chosen views of SCENE and write it, with train.json, into one folder.
 
     --ratio and --count take the first views of a greedy selector's order, which are what it would choose for that
@@ -47,36 +29,29 @@ def command(
     """
     from ...backends import _registry
     from ...backends._train import train
-    from ...backends._types import Budget
+    from ...backends._types import Budget, Job
     from ...common import settings as settings_file
     from ...common.errors import UserError
     from ...selectors._selection import count_of, first_views, load_selection
 
     settings = settings_file.load()
-    if iterations is None and seconds is None:
-        iterations = _registry.load(backend, settings).CAPABILITIES.default_iterations
-    opened = _options.open_scene(scene, settings, format=format_, holdout=holdout, allow_outside=allow_outside)
-    chosen = load_selection(selection)
-    if ratio is not None and count is not None:
+    budget = Budget(given["iterations"], given["seconds"])
+    if budget == Budget():
+        budget = Budget(_registry.load(given["backend"], settings).CAPABILITIES.default_iterations)
+    scene = given["scene"].open(settings)
+    chosen = load_selection(given["selection"])
+    count = given["count"]
+    if given["ratio"] is not None and count is not None:
         raise UserError("give --ratio or --count, not both")
-    if ratio is not None:
-        count = count_of(ratio, len(opened.train), count_rule)
-    record = train(
-        opened,
-        chosen if count is None else first_views(chosen, count),
-        backend,
-        out,
-        settings=settings,
-        seed=seed,
-        budget=Budget(iterations, seconds),
-        width=width,
-        options=_options.settings_of(options),
-        progress=_options.progress("train"),
-    )
+    if given["ratio"] is not None:
+        count = count_of(given["ratio"], len(scene.train), given["count_rule"])
+    chosen = chosen if count is None else first_views(chosen, count)
+    job = Job(given["backend"], given["seed"], budget, given["width"], _options.settings_of(given["options"]))
+    record = train(scene, chosen, job, given["out"], settings=settings, progress=_options.progress("train"))
     primitives = "" if record["n_primitives"] is None else f", {record['n_primitives']} primitives"
     click.echo(f"{record['iterations']} iterations in {record['seconds']:.1f} s{primitives}")
     seeding = record["seeding"]
-    if seeding.get("source"):
-        click.echo(f"started from {seeding['count'] - seeding.get('shell_points', 0)} points by {seeding['source']}")
-    if seeding.get("fallback"):
+    if seeding["count"]:
+        click.echo(f"started from {seeding['count'] - seeding['shell_points']} points by {seeding['source']}")
+    if seeding["fallback"]:
         click.echo(f"note: {seeding['fallback']}")

@@ -61,7 +61,7 @@ def test_training_makes_the_pictures_better(data, tmp_path):
     assert record.curve[-1]["loss"] < 0.5 * record.curve[0]["loss"]
     assert [point["step"] for point in record.curve] == sorted({point["step"] for point in record.curve})
     assert record.iterations == 300
-    assert record.seeding["source"].startswith("scene")
+    assert record.seeding.source.startswith("scene")
 
 
 def test_same_seed_same_bytes(data, tmp_path):
@@ -113,7 +113,7 @@ def test_small_pictures_are_not_halved(data):
 
 
 def test_a_picture_of_half_the_size_is_of_the_same_things(data):
-    from viewbench.backends.splat.shrink import cameras_shrunk, images_shrunk
+    from viewbench.backends._shrink import cameras_shrunk, images_shrunk
 
     g = cloud(60, np.random.default_rng(0), spread=0.3)
     whole = np.stack(list(loop.draw(g, data.cameras, Rendering())))

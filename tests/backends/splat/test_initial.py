@@ -1,19 +1,20 @@
 """Where Gaussians start, in a room whose depths are known: a box with painted walls, seen from inside."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
+from viewbench.backends._points import knowing
+from viewbench.backends._points.depth_maps import depth_maps
+from viewbench.backends._points.drawn import along_rays
+from viewbench.backends._points.neighbours import neighbours
+from viewbench.backends._points.plane_sweep import sweep
 from viewbench.backends._surroundings import surroundings
 from viewbench.backends._types import TrainingSet
-from viewbench.backends.splat import seeding
-from viewbench.backends.splat.depth_maps import depth_maps
+from viewbench.backends.splat.initial import initial
 from viewbench.backends.splat.layout import LOGIT, MEAN
-from viewbench.backends.splat.neighbours import neighbours
 from viewbench.backends.splat.options import Options
-from viewbench.backends.splat.plane_sweep import sweep
-from viewbench.backends.splat.seeding import along_rays
 from viewbench.backends.splat.shell import shell
 from viewbench.common.errors import UserError
 from viewbench.scenes.types import Cameras, Points
@@ -23,8 +24,9 @@ SIZE, HALF_ROOM = 48, 2.0
 
 def seed(data, o, rng):
     """The start as a training makes it: of what this source may know."""
-    data = replace(data, points=seeding.known_points(data, o.points))
-    return seeding.seed(data, o, surroundings(data.training, data.points), rng)
+    data = knowing(data, o.points)
+    gaussians, seeding = initial(data, o, surroundings(data.training, data.points), rng)
+    return gaussians, asdict(seeding)
 
 
 def cameras(positions, angles):
@@ -146,12 +148,13 @@ def test_every_source_is_counted(walk):
     walls[np.arange(800), np.arange(800) % 3] = HALF_ROOM
     tracks = tuple([np.array([0, 3, 6])] * 500 + [np.array([1])] * 300)
     data = replace(data, points=Points(walls, np.full((800, 3), 128, np.uint8), tracks))
-    wanted = {"auto": "scene and sweep", "scene": "scene", "selected": "selected", "sweep": "sweep", "rays": "rays"}
+    wanted = {"auto": "scene and sweep", "scene": "scene", "selected": "selected", "sweep": "sweep"}
+    wanted |= {"rays": "rays", "random": "random"}
     for source, name in wanted.items():
         gaussians, record = seed(data, options(points=source), np.random.default_rng(0))
         assert record["source"] == name
-        assert record["asked"] == source
-        parts = [record[f"{part}_points"] for part in ("scene", "sweep", "guessed", "ray", "shell")]
+        assert record["points"] == source
+        parts = [record[f"{part}_points"] for part in ("scene", "sweep", "guessed", "ray", "random", "shell")]
         assert sum(parts) == record["count"] == gaussians.shape[1] <= 3000
         assert np.isfinite(gaussians).all()
         assert record["scene_points"] == {"auto": 800, "scene": 800, "selected": 500}.get(source, 0)
@@ -202,7 +205,7 @@ def test_a_few_scene_points_are_kept_beside_rays():
 
 @pytest.mark.parametrize(
     "changed",
-    [{"gaussians": 0}, {"shell": -1}, {"sweep": float("nan")}, {"opacity": 1.0}, {"scale": 0.0}, {"degree": 4}],
+    [{"gaussians": 0}, {"shell": -1}, {"sweep": float("nan")}, {"opacity": 1.0}, {"scale": 0.0}, {"sh_degree": 4}],
 )
 def test_values_that_make_no_sense_are_refused(changed):
     with pytest.raises(UserError, match=f"{next(iter(changed))}=.*expected a value from"):
@@ -276,19 +279,10 @@ def test_the_shell_has_the_colours_that_look_its_way(walk):
     assert 0.3 < size / (np.linalg.norm(positions[0]) * np.sort(nearest, axis=1)[:, 1].mean()) < 2
 
 
-def test_points_that_are_asked_for_and_missing_are_refused(walk):
-    data, _ = walk
-    lone = Points(np.zeros((1, 3)), np.zeros((1, 3), np.uint8), (np.array([1]),))
-    for changed, source in ((data, "scene"), (replace(data, points=lone, chosen=np.array([2, 3])), "selected")):
-        with pytest.raises(UserError, match=f"no points for '{source}'"):
-            seed(changed, options(points=source), np.random.default_rng(0))
-    with pytest.raises(UserError, match="did you mean 'scene'"):
-        seed(data, options(points="scenes"), np.random.default_rng(0))
-
-
 def test_points_along_rays_project_onto_their_pixels(walk):
     data, _ = walk
-    points, colours = along_rays(data, 200, 3.0, np.random.default_rng(3))
+    start = along_rays(data, 200, 3.0, np.random.default_rng(3))
+    points, colours = start.points, start.colours
     inside = 0
     for camera, image in zip(data.cameras, data.images, strict=True):
         x, y, z = (np.c_[points, np.ones(200)] @ camera.world_to_camera()[0].T)[:, :3].T

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...scenes.types import Cameras
+from .._shrink import cameras_shrunk, images_shrunk
 from .._types import TrainingSet
 from .neighbours import neighbours
 from .plane_sweep import sweep
-from .shrink import cameras_shrunk, images_shrunk
 
 SIDE = 64  # pixels: about the geometric mean of the sides of the pictures that are compared
 PLANES = 48

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...scenes.types import Cameras
+from ..scenes.types import Cameras
 
 
 def images_shrunk(images: np.ndarray, factor: int) -> np.ndarray:

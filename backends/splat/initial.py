@@ -1,0 +1,55 @@
+"""The Gaussians at the start: as large as their neighbours are far, at the points that backends share, in a shell."""
+
+import dataclasses
+
+import numpy as np
+
+from .._points import Start, Wanted, starting_points
+from .._surroundings import Surroundings
+from .._types import Seeding, TrainingSet
+from .layout import LOG_SCALE, LOGIT, MEAN, SH0, SH_C0, empty
+from .options import Options
+from .shell import shell
+
+# Where the depth is not known, almost transparent, so that what is wrong fades; elsewhere the option `opacity` says it.
+OPACITIES = {"guessed": 0.1, "ray": 0.03, "random": 0.1, "shell": 0.5}
+
+
+def initial(
+    data: TrainingSet, o: Options, around: Surroundings, rng: np.random.Generator
+) -> tuple[np.ndarray, Seeding]:
+    """(rows, N) parameters of the Gaussians, N at most `o.gaussians`, and the record of where they come from.
+
+    Raises UserError when a source of points that was asked for has none.
+    """
+    extent = around.extent
+    shell_count = min(o.shell, o.gaussians // 2)
+    starts, seeding = starting_points(data, Wanted(o.points, o.gaussians - shell_count, sweep=o.sweep), around, rng)
+    points = np.concatenate([start.points for start in starts])
+    scales = o.scale * np.maximum(spacing(points), 1e-6 * extent)
+    if shell_count:
+        positions, colours, size = shell(data, shell_count, around)
+        starts.append(Start(positions, colours, "shell"))
+        scales = np.append(scales, np.full(shell_count, size))
+    seeding = dataclasses.replace(seeding, count=len(scales), shell_points=shell_count)
+    return _gaussians(starts, scales, o), seeding
+
+
+def _gaussians(starts: list[Start], scales: np.ndarray, o: Options) -> np.ndarray:
+    gaussians = empty(len(scales), o.sh_degree)
+    gaussians[MEAN : MEAN + 3] = np.concatenate([start.points for start in starts]).T
+    gaussians[LOG_SCALE : LOG_SCALE + 3] = np.log(scales)
+    opacity = np.concatenate([np.full(len(start), OPACITIES.get(start.kind, o.opacity)) for start in starts])
+    gaussians[LOGIT] = np.log(opacity / (1 - opacity))
+    gaussians[SH0 : SH0 + 3] = (np.concatenate([start.colours for start in starts]).T - 0.5) / SH_C0
+    return gaussians
+
+
+def spacing(points: np.ndarray) -> np.ndarray:
+    """(N,) root mean square distance to the three nearest neighbours, as 3DGS sets its first scales."""
+    from scipy.spatial import cKDTree
+
+    if len(points) < 4:
+        return np.linalg.norm(points - points.mean(axis=0), axis=1)
+    distance, _ = cKDTree(points).query(points, k=4)
+    return np.sqrt((distance[:, 1:] ** 2).mean(axis=1))
