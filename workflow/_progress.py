@@ -23,7 +23,7 @@ class Progress(logging.Handler):
         self.jobs: dict[int, tuple[str, list[str]]] = {}
         self.planned = dict.fromkeys(STEPS, 0)
         self.finished = dict.fromkeys(STEPS, 0)
-        self.failed = 0
+        self.failures: set[str] = set()  # outputs of jobs; some releases report one failure twice
         self.began: float | None = None
         self.last_line = -1e9
         self.width = 0
@@ -50,10 +50,12 @@ class Progress(logging.Handler):
         self._show()
 
     def _fail(self, record: logging.LogRecord) -> None:
-        self.failed += 1
         rule = getattr(record, "rule_name", "?")
         words = last_line(list(getattr(record, "log", []) or []))
         output = ", ".join(getattr(record, "output", []) or [])
+        if output in self.failures:
+            return
+        self.failures.add(output)
         self._clear()
         print(f"failed: {rule} of {output}: {words or 'see its log'}", file=self.stream, flush=True)
 
@@ -75,8 +77,8 @@ class Progress(logging.Handler):
         """The line: cells, failures, elapsed time and time left."""
         left = self.seconds_left
         parts = [f"{self.done} of {self.cells} cells"]
-        if self.failed:
-            parts.append(f"{self.failed} failed")
+        if self.failures:
+            parts.append(f"{len(self.failures)} failed")
         if self.began is not None:
             parts.append(f"{_clock(self.clock() - self.began)} so far")
         if self.done < self.cells:
