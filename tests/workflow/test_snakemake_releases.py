@@ -81,10 +81,7 @@ def test_progress_failures_and_silence(release, tmp_path):
     assert all("train of results/mini/cells/command-broken/" in line and "no luck" in line for line in failures)
     assert "Reporting the cells that are finished" in said
     # None of what Snakemake prints of jobs by itself.
-    assert not [word for word in ("rule train", "jobid", "Finished job", "Select jobs", "reason:") if word in said], (
-        said
-    )
-    (clone.folder / "environment.toml").write_text(SETTINGS.replace("exit 1", "cp /dev/null model"), encoding="utf-8")
-    dry = clone.snakemake("-n", **variables)
-    assert "rule train" in dry.stdout + dry.stderr, "a dry run says what it would do"
-    assert "of 4 cells" not in dry.stdout + dry.stderr
+    noise = ("rule train", "jobid", "Finished job", "Select jobs", "reason:")
+    assert not [word for word in noise if word in said], said
+    jobs = clone.planned(**variables)
+    assert jobs["train"] == 2, "the two that failed"
