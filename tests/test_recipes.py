@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from tests.backends.conftest import nearest_command
 from tests.conftest import ROOM
 from tests.workflow.clones import Clone
 
@@ -12,7 +13,7 @@ scenes: [mine]
 selectors: [every-third, uniform]
 ratios: [0.25]
 seeds: 2
-backends: [{backend: grey}]
+backends: [{backend: grey}, command:mine]
 budget: {iterations: 1}
 encoder: brightness
 reference: false
@@ -76,6 +77,17 @@ from ._items import Item
 def build(study, out):
     return [Item("Cells", "text", f"There are {len(study.done)} cells.")]
 """
+COMMAND = """
+\"\"\"Count the training views.\"\"\"
+import click
+from . import _options
+@click.command()
+@_options.scene_options
+def command(scene):
+    \"\"\"Print how many training views SCENE has.\"\"\"
+    from ...common import settings
+    click.echo(len(scene.open(settings.load()).train))
+"""
 
 
 @pytest.fixture(scope="module")
@@ -97,16 +109,25 @@ def extended(tmp_path_factory):
         "scenes/formats/frames_csv.py": FORMAT,
         "scenes/encoders/brightness.py": ENCODER,
         "reports/cell_count.py": REPORT,
+        "workflow/commands/count.py": COMMAND,
     }.items():
         (clone.folder / name).write_text(text, encoding="utf-8")
+    program = nearest_command()
     settings = f"[scenes.mine]\npath = {str(folder)!r}\nholdout = 'every:4'\n"
+    settings += f"[command.mine]\ntrain = {json.dumps(program.train)}\nrender = {json.dumps(program.render)}\n"
     (clone.folder / "environment.toml").write_text(settings, encoding="utf-8")
     return clone
 
 
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [("selectors", "every-third"), ("backends", "grey"), ("formats", "frames-csv"), ("encoders", "brightness")],
+    [
+        ("selectors", "every-third"),
+        ("backends", "grey"),
+        ("formats", "frames-csv"),
+        ("encoders", "brightness"),
+        ("backends", "command:mine"),
+    ],
 )
 def test_it_is_listed(extended, kind, name):
     done = extended.call("viewbench", "list", kind)
@@ -122,10 +143,16 @@ def test_a_format_that_is_read_only_is_written_as_transforms(extended, tmp_path)
     assert (tmp_path / "out" / "transforms.json").is_file()
 
 
+def test_a_command_is_called_by_the_name_of_its_file(extended):
+    done = extended.call("viewbench", "count", "mine")
+    assert (done.stdout, done.returncode) == ("12\n", 0), done.stderr
+    assert "Count the training views." in extended.call("viewbench", "--help").stdout
+
+
 def test_a_study_uses_them_all(extended):
     extended.run()
     page = (extended.results / "reports" / "index.html").read_text(encoding="utf-8")
-    assert "There are 4 cells." in page
+    assert "There are 8 cells." in page
     record = json.loads(next(extended.results.rglob("every-third/**/selection.json")).read_text())
     assert record["indices"] == [0, 3, 6]
     assert record["features_sha256"]
