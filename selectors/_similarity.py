@@ -19,7 +19,6 @@ import numpy as np
 from ..common.errors import UserError, nearest
 from ._types import FACTORS, Views
 
-DEFAULTS = {"alpha": 0.7, "beta": 0.2, "sigma": 0.5, "factors": list(FACTORS)}
 CHUNK = 1 << 20  # numbers converted to float64 at a time
 
 
