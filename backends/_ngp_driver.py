@@ -1,11 +1,39 @@
 """Runs inside instant-ngp's own Python and drives its module pyngp; imports nothing of viewbench.
 
     _ngp_driver.py check CHECKOUT
-    _ngp_driver.py train CHECKOUT --scene FILE --snapshot FILE --record FILE --steps N --seconds S --near D
+    _ngp_driver.py train CHECKOUT --scene FILE --snapshot FILE --record FILE --network NAME --steps N --seconds S
+        --near D
     _ngp_driver.py render CHECKOUT --snapshot FILE --cameras FILE --images FOLDER --samples N --near D
 
-The names of pyngp are those of instant-ngp's src/python_api.cu; the way of training and rendering is that of its
-scripts/run.py, which itself cannot do it: its screenshots know no principal point and one field of view for all.
+The way of training and rendering is that of instant-ngp's scripts/run.py, which itself cannot do it: its screenshots
+know no principal point and one field of view for all. What is called, what it corresponds to, and where that was read
+(commit abe236e; run.py, bindings = src/python_api.cu, testbed = src/testbed.cu, loader = src/nerf_loader.cu):
+
+    sys.path, `import pyngp`       common.py: every folder below build* that holds a module
+    Testbed(), root_dir            run.py: `testbed.root_dir = ROOT_DIR`. Without it the network's configuration is
+                                   looked for below the working folder (testbed, find_network_config), is not found,
+                                   and the first step throws "Unable to create a neural network trainer."
+    load_training_data(FILE)       run.py --scene. A file is read alone, a folder with every .json in it (testbed_nerf,
+                                   load_nerf). Loader: frames in natural order of file_path; p → 0.33 p + 0.5; pixels
+                                   8-bit sRGB; focal lengths in pixels; cx, cy over the frame's own w, h
+    reload_network_from_file       run.py --network; configs/nerf/base.json is its default. Before the clock starts,
+                                   since it allocates and compiles
+    training.near_distance         run.py --near_distance; negative leaves 0.1 in its own units
+    shall_train, frame()           run.py: one step a call; without a window nothing is drawn
+    training_step, loss            run.py's progress bar; the loss is brought up to date every 16 steps
+    save_snapshot(FILE, False)     run.py --save_snapshot: without the optimiser's state. It has the data set's scale,
+                                   offset, aabb_scale and cameras, but no picture
+    load_snapshot(FILE)            run.py --load_snapshot
+    background_color 0, 0, 0, 1    run.py scores test views on black
+    exposure 0                     run.py's default
+    snap_to_pixel_centers          run.py, for test views
+    render_min_transmittance       run.py: 1e-4 for test views
+    render_near_distance           bindings; 0 by default
+    set_nerf_camera_matrix         run.py: the upper three rows of transform_matrix, converted as the loader does
+    fov_axis, relative_focal_length, screen_center
+                                   testbed, set_camera_to_training_view: focal length over the size along fov_axis,
+                                   1 - principal point
+    render(W, H, samples, False)   run.py renders linear and converts to sRGB before it compares; False converts within
 """
 
 import argparse
@@ -33,10 +61,25 @@ def import_pyngp(checkout: Path) -> Any:
     return importlib.import_module("pyngp")
 
 
-def train(ngp: Any, scene: Path, snapshot: Path, record: Path, steps: int, seconds: float, near: float) -> None:
+def configurations(checkout: Path) -> dict[str, Path]:
+    """Files of the networks for radiance fields by name; "base" is instant-ngp's default."""
+    return {file.stem: file for file in sorted((checkout / "configs" / "nerf").glob("*.json"))}
+
+
+def testbed_of(checkout: Path) -> Any:
+    """A fresh testbed that finds what belongs to it."""
+    testbed = import_pyngp(checkout).Testbed()
+    testbed.root_dir = str(checkout)
+    return testbed
+
+
+def train(
+    checkout: Path, scene: Path, snapshot: Path, record: Path, network: str, steps: int, seconds: float, near: float
+) -> None:
     """Trains until `steps` or `seconds` (0: no such limit), saves the network, and notes steps, seconds and losses."""
-    testbed = ngp.Testbed()
+    testbed = testbed_of(checkout)
     testbed.load_training_data(str(scene))
+    testbed.reload_network_from_file(str(configurations(checkout)[network]))
     if near >= 0:
         testbed.nerf.training.near_distance = near
     testbed.shall_train = True
@@ -56,14 +99,15 @@ def train(ngp: Any, scene: Path, snapshot: Path, record: Path, steps: int, secon
     record.write_text(json.dumps(result), encoding="utf-8")
 
 
-def render(ngp: Any, snapshot: Path, cameras: Path, images: Path, samples: int, near: float) -> None:
+def render(checkout: Path, snapshot: Path, cameras: Path, images: Path, samples: int, near: float) -> None:
     """Writes an (H, W, 3) float32 array in sRGB for every frame of the transforms file `cameras`, in its order."""
     import numpy as np
 
-    testbed = ngp.Testbed()
+    testbed = testbed_of(checkout)
     testbed.load_snapshot(str(snapshot))
     testbed.shall_train = False
     testbed.background_color = [0.0, 0.0, 0.0, 1.0]
+    testbed.exposure = 0.0
     testbed.snap_to_pixel_centers = True
     testbed.nerf.render_min_transmittance = MIN_TRANSMITTANCE
     if near >= 0:
@@ -83,7 +127,10 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     actions = parser.add_subparsers(dest="action", required=True)
     places = {"train": ("scene", "snapshot", "record"), "render": ("snapshot", "cameras", "images"), "check": ()}
-    numbers = {"train": {"steps": int, "seconds": float, "near": float}, "render": {"samples": int, "near": float}}
+    numbers: dict[str, dict[str, Any]] = {
+        "train": {"network": str, "steps": int, "seconds": float, "near": float},
+        "render": {"samples": int, "near": float},
+    }
     for action, names in places.items():
         known = actions.add_parser(action)
         known.add_argument("checkout", type=Path)
@@ -92,11 +139,13 @@ def main() -> None:
         for name, kind in numbers.get(action, {}).items():
             known.add_argument(f"--{name}", type=kind, required=True)
     arguments = vars(parser.parse_args())
-    action, ngp = arguments.pop("action"), import_pyngp(arguments.pop("checkout"))
+    action = arguments.pop("action")
     if action == "train":
-        train(ngp, **arguments)
+        train(**arguments)
     elif action == "render":
-        render(ngp, **arguments)
+        render(**arguments)
+    else:
+        import_pyngp(arguments["checkout"])
 
 
 if __name__ == "__main__":

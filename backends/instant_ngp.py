@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.errors import UserError
+from ..common.errors import UserError, nearest
 from ..common.files import read_json, sha256_file, write_json
 from ..common.settings import Settings
 from ..scenes.types import Cameras
@@ -24,6 +24,7 @@ RECORD = "model.json"
 LOG = "instant_ngp.log"
 SCALE = 0.33  # instant-ngp multiplies positions by it and adds 0.5, so that the unit cube is 3 scene units wide
 LARGEST_AABB = 128
+DEFAULT_NETWORK = "base"
 CHECK_SECONDS = 60.0
 BUILD = (
     "clone https://github.com/NVlabs/instant-ngp with --recursive, build it (cmake . -B build && cmake --build build) "
@@ -42,6 +43,7 @@ class InstantNgp:
         device="cuda",
         deterministic=False,  # its CUDA kernels add up in no fixed order
         options={
+            "network": DEFAULT_NETWORK,  # a file of its configs/nerf: base, big, small, …
             "aabb_scale": 4,  # side of the box in units of 1 / 0.33 scene units; the paper takes 16 for Replica
             "near_distance": -1.0,  # where rays start, in its own units; negative leaves its default
             "samples": 8,  # per pixel of a render
@@ -56,6 +58,8 @@ class InstantNgp:
             return f"[instant_ngp] path '{folder}' is not there; {BUILD}"
         if not _ngp_driver.modules(folder):
             return f"'{folder}' has no build/pyngp; build it with its Python bindings (cmake --build build)"
+        if DEFAULT_NETWORK not in _ngp_driver.configurations(folder):
+            return f"'{folder}' has no configs/nerf/{DEFAULT_NETWORK}.json; set [instant_ngp] path to a whole checkout"
         if shutil.which(self.python) is None:
             return f"[instant_ngp] python '{self.python}' is not there; set it to the Python that pyngp was built for"
         try:
@@ -79,16 +83,25 @@ class InstantNgp:
         except (OSError, subprocess.SubprocessError):
             return f"instant-ngp {built}"
 
+    def configuration(self) -> dict[str, dict[str, Any]]:
+        """The networks' files, which anyone may edit without building the module again."""
+        networks = _ngp_driver.configurations(Path(self.checkout).expanduser()) if self.checkout else {}
+        return {"train": {"networks": {name: sha256_file(file)[:12] for name, file in networks.items()}}}
+
     def train(
         self, data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict[str, Any], report: Report
     ) -> Trained:
         """Writes the chosen views as transforms.json, trains, and keeps the snapshot of the network.
 
         Its own seed is fixed and not within reach of Python; which rays it draws depends on the order of the frames,
-        so that is what the seed shuffles. Raises UserError for a box that it does not know or that cameras are outside
-        of, and, with its last line, when it fails.
+        so that is what the seed shuffles. Raises UserError for a network or a box that it does not know, for cameras
+        outside of the box, and, with its last line, when it fails.
         """
         _check(data, options)
+        networks = _ngp_driver.configurations(Path(self.checkout).expanduser())
+        if options["network"] not in networks:
+            close = nearest(options["network"], networks)
+            raise UserError(f"its configs/nerf has no network '{options['network']}'{close} ({', '.join(networks)})")
         order = np.random.default_rng(seed).permutation(len(data.names))
         scene = out / "scene"
         extra = {"aabb_scale": options["aabb_scale"]}
@@ -98,6 +111,7 @@ class InstantNgp:
             "scene": scene / "transforms.json",
             "snapshot": out / SNAPSHOT,
             "record": out / RECORD,
+            "network": options["network"],
             "steps": budget.iterations or 0,
             "seconds": budget.seconds or 0.0,
             "near": options["near_distance"],

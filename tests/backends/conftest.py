@@ -43,6 +43,9 @@ def make_checkout(folder: Path) -> Path:
     """A folder like a checkout of instant-ngp that has been built, with the stand-in for its module."""
     (folder / "build").mkdir(parents=True)
     shutil.copy(PYNGP, folder / "build" / "pyngp.py")
+    (folder / "configs" / "nerf").mkdir(parents=True)
+    for name in ("base", "big"):
+        (folder / "configs" / "nerf" / f"{name}.json").write_text(json.dumps({"encoding": name}), encoding="utf-8")
     return folder
 
 

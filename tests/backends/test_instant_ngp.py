@@ -40,7 +40,8 @@ def test_a_model_is_trained_and_its_views_come_back(checkout, take_views, tmp_pa
     assert (trained.iterations, trained.curve[-1]["step"]) == (40, 40)
     assert not (tmp_path / "m" / "scene").exists()
     for image, view in zip(backend.render(tmp_path / "m", views.cameras), views.images, strict=True):
-        assert np.abs(image - view).max() <= 0.5 / 255 + 1e-6
+        assert np.abs(image - view)[:-1].max() <= 0.5 / 255 + 1e-6
+        assert (image[-1] == 0).all(), "where a model has nothing, the background is black"
     (small,) = backend.render(tmp_path / "m", views.cameras[1].scaled(20))
     assert (small.shape, small.dtype) == ((20, 20, 3), np.float32)
 
@@ -49,6 +50,37 @@ def test_the_snapshot_holds_the_box_that_was_asked_for(checkout, take_views, tmp
     for side in (4, 16):
         train(load(checkout), take_views(), tmp_path / str(side), aabb_scale=side)
         assert json.loads((tmp_path / str(side) / "model.ingp").read_text())["aabb_scale"] == side
+
+
+def test_its_network_is_found_wherever_the_model_is_trained(checkout, take_views, tmp_path):
+    backend = load(checkout)
+    for name in ("base", "big"):
+        train(backend, take_views(), tmp_path / name, network=name)
+        assert json.loads((tmp_path / name / "model.ingp").read_text())["network"] == {"encoding": name}
+    with pytest.raises(UserError, match=r"has no network 'bgi'; did you mean 'big'\? \(base, big\)"):
+        train(backend, take_views(), tmp_path / "m", network="bgi")
+    before = backend.configuration()
+    (checkout / "configs" / "nerf" / "base.json").write_text("{}")
+    assert backend.configuration() != before, "an edited network is another training"
+    (checkout / "configs" / "nerf" / "base.json").unlink()
+    assert "has no configs/nerf/base.json" in backend.available()
+
+
+def test_the_stand_in_asks_for_a_root_directory(checkout, take_views, tmp_path, monkeypatch):
+    """What an adapter that forgets it meets: no network, and no step."""
+    from viewbench.backends import _subset
+
+    monkeypatch.chdir(tmp_path)
+    views = take_views()
+    _subset.write(tmp_path / "scene", "transforms", views.cameras, views.images, extra={"aabb_scale": 4})
+    monkeypatch.syspath_prepend(str(checkout / "build"))
+    testbed = __import__("pyngp").Testbed()
+    testbed.load_training_data(str(tmp_path / "scene" / "transforms.json"))
+    testbed.shall_train = True
+    with pytest.raises(RuntimeError, match="Unable to create a neural network trainer"):
+        testbed.frame()
+    testbed.root_dir = str(checkout)
+    assert testbed.frame()
 
 
 def test_the_seed_changes_the_order_of_frames_and_not_the_frames(checkout, take_views, tmp_path):
