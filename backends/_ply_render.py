@@ -1,7 +1,7 @@
 """Renders a PLY file of 3D Gaussians that some other program trained, with whichever of our rasterisers can."""
 
 import importlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -11,11 +11,12 @@ from ..scenes.types import Cameras
 from . import _gaussian_ply
 
 NEAR = 0.01  # scene units
-BLACK = 0.0  # background
 
 
-def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
-    """(H, W, 3) float32 in [0, 1] on black, one for each camera: by gsplat where there is a GPU, else on the CPU.
+def render_ply(path: Path, cameras: Cameras, background: Sequence[float]) -> Iterator[np.ndarray]:
+    """(H, W, 3) float32 in [0, 1], one for each camera: by gsplat where there is a GPU, else on the CPU.
+
+    background: red, green, blue in [0, 1], those that the model was trained on.
 
     Raises UserError for a file that is no such PLY.
     """
@@ -23,10 +24,10 @@ def render_ply(path: Path, cameras: Cameras) -> Iterator[np.ndarray]:
     gsplat = _module("gsplat").Gsplat()
     reason = gsplat.available()
     if reason is None:
-        renderer = _module("gsplat.renderer").Renderer(gsplat.rasterizer(), gsplat.device, BLACK, NEAR)
+        renderer = _module("gsplat.renderer").Renderer(gsplat.rasterizer(), gsplat.device, background, NEAR)
         yield from renderer.images(renderer.parameters(gaussians), cameras, gaussians.degree)
         return
-    rendering = _module("splat.options").Rendering(near=NEAR, background=BLACK, degree=gaussians.degree)
+    rendering = _module("splat.options").Rendering(near=NEAR, background=tuple(background), degree=gaussians.degree)
     model = _module("splat.ply").read(path)
     yield from _module("splat.loop").draw(model, cameras, rendering)
 

@@ -1,8 +1,6 @@
 """Any trainer that runs as a command, described in environment.toml as [command.NAME]."""
 
-import hashlib
 import shutil
-import string
 import sys
 import tempfile
 import time
@@ -14,24 +12,21 @@ from typing import Any
 import numpy as np
 
 from ..common.errors import UserError, nearest
-from ..common.files import read_json, sha256_file, write_json
+from ..common.files import read_json, write_json
 from ..common.settings import Command, Settings
-from ..scenes.image_files import is_file
 from ..scenes.types import Cameras
 from . import _process, _subset
+from ._command_line import OUTPUT_PLACES, RENDER_PLACES, TRAIN_PLACES, check_places, filled, free_port, places_in
 from ._ply_render import ply_renderer, render_ply  # no source: training does not draw
 from ._points import SOURCES, WITHOUT, Wanted, knowing, starting_points
+from ._program import files_sha256, program_version
 from ._surroundings import surroundings
 from ._types import Budget, Capabilities, Report, Seeding, Trained, TrainingSet
 
 LOG = "command.log"
 SCENE = "scene"  # the subset, inside the model folder while the program trains
-TRAIN_PLACES = ("scene", "out", "seed", "iterations", "seconds", "width", "height", "views")
-RENDER_PLACES = ("cameras", "renders", "out", "seed", "iterations", "width", "height")
-OUTPUT_PLACES = ("name", "index", "out", "iterations")
 RECORD = "command.json"  # what rendering has to know of the training
 VERSION_SECONDS = 60.0
-LONGEST_NAME = 4096  # of a path; more is a script in the command line
 
 PLY_RENDERERS = ("backends._ply_render", "backends.gsplat", "backends.splat")
 
@@ -72,7 +67,7 @@ class External:
     @property
     def CAPABILITIES(self) -> Capabilities:  # noqa: N802 - the name that the protocol gives it
         """A limit is obeyed where the command line passes it on."""
-        places = _places(self.entry.train)
+        places = places_in(self.entry.train)
         return Capabilities(
             device=self.entry.device,
             iterations="iterations" in places,
@@ -91,8 +86,9 @@ class External:
         entry = self.entry
         train = {"train": entry.train, "format": entry.format}
         render = {"render": entry.render, "format": entry.format, "output": entry.output}
-        render |= {"files": _hash_of_files(entry.render)}
-        return {"train": train, "render": render if entry.render else {"output": entry.output}}
+        render |= {"files": files_sha256(entry.render)}
+        drawn = {"output": entry.output, "background": entry.background}
+        return {"train": train, "render": render if entry.render else drawn}
 
     def drawn_by(self) -> str:
         """What draws its models here: it does, or one of our rasterisers does."""
@@ -105,9 +101,9 @@ class External:
         return None
 
     def version(self) -> str:
-        """What its `version` command prints last, or a hash of the files that its `train` command names."""
+        """What its `version` command prints last, or what can be found out about the program."""
         if not self.entry.version:
-            return f"sha256:{_hash_of_files(self.entry.train)}"
+            return program_version(self.entry.train)
         with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
             log = Path(folder) / LOG
             _process.run(self.entry.version, Path(folder), log, f"{self._what} --version", VERSION_SECONDS)
@@ -128,18 +124,19 @@ class External:
             "width": int(data.cameras.width[0]),
             "height": int(data.cameras.height[0]),
             "views": len(data.names),
+            "port": free_port(),
         }
         for limit in ("iterations", "seconds"):
             value = getattr(budget, limit)
             if value is not None:
                 values[limit] = value
-            elif limit in _places(self.entry.train):
+            elif limit in places_in(self.entry.train):
                 raise UserError(f"{self._what} takes {limit}; add them to the budget")
         points, seeding = self._points(data, str(options["points"]), seed)
         _subset.write(out / SCENE, self.entry.format, data.cameras, data.images, points)
         began = time.perf_counter()
         report.progress(0, None, f"running {self.entry.train[0]}, which writes {LOG}")
-        command = _filled(self.entry.train, values)
+        command = filled(self.entry.train, values)
         usage = _process.run(command, out, out / LOG, self._what, self.entry.timeout or None)
         seconds = time.perf_counter() - began
         shutil.rmtree(out / SCENE)
@@ -162,7 +159,7 @@ class External:
         Without that command the output is a PLY file of 3D Gaussians, which viewbench renders itself.
         """
         if not self.entry.render:
-            yield from render_ply(model / self.entry.output, cameras)
+            yield from render_ply(model / self.entry.output, cameras, self.entry.background)
             return
         with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
             place = Path(folder).resolve()
@@ -175,13 +172,14 @@ class External:
                 "renders": place / "renders",
                 "width": int(cameras.width[0]),
                 "height": int(cameras.height[0]),
+                "port": free_port(),
             }
             names = (Path(_subset.image_name(index)).stem for index in range(len(cameras)))
             output = [self.entry.output.format(**values, name=name, index=i) for i, name in enumerate(names)]
             files = [place / "renders" / path for path in output]  # an absolute path stands for itself
             for file in files:
                 file.unlink(missing_ok=True)  # of an earlier run, where {out} holds them
-            command = _filled(self.entry.render, values)
+            command = filled(self.entry.render, values)
             _process.run(command, model, place / LOG, f"{self._what} (render)", self.entry.timeout or None)
             yield from _subset.read_images(files, cameras, self._what)
 
@@ -192,6 +190,9 @@ class External:
     def _points(self, data: TrainingSet, source: str, seed: int) -> tuple[Any, Seeding]:
         """Points for the scene that the program gets; a scene without any is none of its business."""
         if source == WITHOUT or (source == "scene" and data.points is None):
+            if self.entry.needs_points:
+                missing = "points=none leaves it" if source == WITHOUT else f"scene '{data.scene}' has"
+                raise UserError(f"{self._what} needs points to start from, and {missing} none; set points=random")
             return None, Seeding()
         if source not in SOURCES:
             known = (*SOURCES, WITHOUT)
@@ -211,47 +212,24 @@ def _check(entry: Command, where: str) -> None:
         raise UserError(f"{where}: format '{entry.format}'{nearest(entry.format, known)} is none of {', '.join(known)}")
     if entry.device not in ("cpu", "cuda"):
         raise UserError(f"{where}: device is '{entry.device}', expected 'cpu' or 'cuda'")
+    if len(entry.background) != 3 or not all(0 <= value <= 1 for value in entry.background):
+        raise UserError(f"{where}: background is {entry.background}, expected red, green and blue from 0 to 1")
     if not entry.train:
         raise UserError(f"{where}: 'train' is an empty list; it starts with the program to run")
-    _check_places(entry.train, TRAIN_PLACES, f"{where} 'train'")
-    _check_places(entry.render, RENDER_PLACES, f"{where} 'render'")
-    _check_places([entry.output], OUTPUT_PLACES, f"{where} 'output'")
-    given = _places([entry.output])
+    check_places(entry.train, TRAIN_PLACES, f"{where} 'train'")
+    check_places(entry.render, RENDER_PLACES, f"{where} 'render'")
+    check_places([entry.output], OUTPUT_PLACES, f"{where} 'output'")
+    given = places_in([entry.output])
     if not entry.render and (given or not entry.output.endswith(".ply")):
         raise UserError(f"{where}: without 'render', 'output' is the PLY file of 3D Gaussians in the model folder")
     if entry.render and not given & {"name", "index"}:
         raise UserError(f"{where}: 'output' names one file for all renders; put {{name}} or {{index}} into it")
-    if "iterations" in given | _places(entry.render) and "iterations" not in _places(entry.train):
+    if "--eval" in entry.train and any(Path(part).name == "train.py" for part in entry.train):
+        at = entry.train.index("--llffhold") if "--llffhold" in entry.train else None
+        if at is None or entry.train[at + 1 : at + 2] != ["0"]:
+            raise UserError(
+                f"{where}: with --eval, train.py of 3DGS holds out every 8th of the chosen views; leave it out, or add "
+                "--llffhold 0"
+            )
+    if "iterations" in given | places_in(entry.render) and "iterations" not in places_in(entry.train):
         raise UserError(f"{where}: rendering takes {{iterations}}, which 'train' does not; write them out")
-
-
-def _check_places(command: list[str], known: tuple[str, ...], where: str) -> None:
-    for part in command:
-        try:
-            parsed = list(string.Formatter().parse(part))
-        except ValueError as error:
-            raise UserError(f"{where}: '{part}': {error}; write a brace that is meant as {{{{ or }}}}") from None
-        for _, place, _, conversion in parsed:
-            if place is not None and (place not in known or conversion):
-                raise UserError(
-                    f"{where}: unknown placeholder {{{place}}}{nearest(place, known)} (known: {', '.join(known)})"
-                )
-
-
-def _places(command: list[str]) -> set[str]:
-    """Names between braces in a command line."""
-    return {place for part in command for _, place, _, _ in string.Formatter().parse(part) if place}
-
-
-def _filled(command: list[str], values: dict[str, Any]) -> list[str]:
-    return [part.format(**values) for part in command]
-
-
-def _hash_of_files(command: list[str]) -> str:
-    """First 12 hex digits of the SHA-256 over the programs and scripts that a command line names, in any folder."""
-    digest = hashlib.sha256()
-    for part in dict.fromkeys(command):
-        found = (shutil.which(part) if len(part) < LONGEST_NAME else None) or (part if is_file(Path(part)) else None)
-        if found:
-            digest.update(f"{Path(part).name}\0{sha256_file(found)}\0".encode())
-    return digest.hexdigest()[:12]

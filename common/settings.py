@@ -4,7 +4,7 @@ import os
 import tomllib
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 from .errors import UserError, nearest
 
@@ -65,6 +65,8 @@ class Command:
     version: list = field(default_factory=list)
     device: str = "cpu"
     timeout: int = 0  # seconds, 0 for none
+    needs_points: bool = False
+    background: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])  # red, green, blue in [0, 1]
 
 
 @dataclass(frozen=True)
@@ -154,13 +156,15 @@ def _section(kind: type, values: Any, where: str) -> Any:
     hints = get_type_hints(kind)
     _known(values, list(hints), where, "key")
     for name, value in values.items():
-        if not isinstance(value, hints[name]) or isinstance(value, bool):
-            raise UserError(f"{where}: '{name}' is {value!r}, expected {_called(hints[name])}")
+        wanted, items = get_origin(hints[name]) or hints[name], get_args(hints[name])
+        if not isinstance(value, wanted) or isinstance(value, bool) != (wanted is bool):
+            raise UserError(f"{where}: '{name}' is {value!r}, expected {_called(wanted)}")
         least, words = (0, "0 or more") if name in MAY_BE_ZERO else (1, "a positive number")
-        if isinstance(value, int) and value < least:
+        if wanted is int and value < least:
             raise UserError(f"{where}: '{name}' is {value}, expected {words}")
-        if isinstance(value, list) and not all(isinstance(item, str) for item in value):
-            raise UserError(f"{where}: '{name}' must be a list of strings")
+        numbers = items == (float,)
+        if wanted is list and not all(isinstance(item, (int, float) if numbers else str) for item in value):
+            raise UserError(f"{where}: '{name}' must be a list of {'numbers' if numbers else 'strings'}")
     try:
         return kind(**values)
     except TypeError:
@@ -175,4 +179,6 @@ def _known(values: dict, known: list[str], where: str, what: str) -> None:
 
 
 def _called(kind: type) -> str:
-    return {str: "a text in quotes", int: "a whole number", list: "a list of texts"}.get(kind, kind.__name__)
+    return {str: "a text in quotes", int: "a whole number", bool: "true or false", list: "a list"}.get(
+        kind, kind.__name__
+    )

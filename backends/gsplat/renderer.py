@@ -1,6 +1,6 @@
 """Calls gsplat's rasterization with our cameras, in training and afterwards."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,12 @@ NEAR = 0.01  # scene units, gsplat's own default
 
 
 class Renderer:
-    """gsplat's rasterization on one device, over a grey level in [0, 1], from a near plane (0: its own)."""
+    """gsplat's rasterization on one device, over a grey level or colour in [0, 1], from a near plane (0: its own)."""
 
-    def __init__(self, rasterize: Callable, device: str, background: float, near: float):
+    def __init__(self, rasterize: Callable, device: str, background: float | Sequence[float], near: float):
         self.rasterize, self.device = rasterize, device
-        self.background = torch.full((1, 3), float(background), device=device)
+        colour = background if isinstance(background, Sequence) else [background] * 3
+        self.background = torch.tensor([colour], dtype=torch.float32, device=device)
         self.near = near or NEAR
 
     def parameters(self, gaussians: Gaussians) -> Parameters:

@@ -2,6 +2,8 @@
 
 import re
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +68,47 @@ def test_the_points_of_all_views_can_be_kept_from_the_program(take_views, tmp_pa
     assert (tmp_path / "m" / "command.log").read_text().strip() == str(count > 0)
 
 
+def test_programs_that_open_a_port_get_one_each(take_views, tmp_path):
+    """Both listen at once, as two jobs of a study do."""
+    code = (
+        "import pathlib, socket, sys, time; s = socket.socket(); s.bind(('127.0.0.1', int(sys.argv[1]))); s.listen()\n"
+        "place = pathlib.Path(sys.argv[2]); (place / sys.argv[1]).touch()\n"
+        "while len(list(place.iterdir())) < 2: time.sleep(0.01)\n"
+        "open('model', 'w')"
+    )
+    (tmp_path / "ports").mkdir()
+    backend = load(train=[*python(code), "{port}", str(tmp_path / "ports")], timeout=60)
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda name: train(backend, take_views(), tmp_path / name), "ab"))
+
+
+def test_a_program_that_needs_points_is_not_started_without(take_views, tmp_path):
+    backend = load(needs_points=True)
+    with pytest.raises(UserError, match="points=none leaves it none; set points=random"):
+        train(backend, take_views(), tmp_path / "a", options={"points": "none"})
+    without = replace(take_views(), points=None)
+    with pytest.raises(UserError, match="scene 'room' has none; set points=random"):
+        train(backend, replace(without, scene="room"), tmp_path / "b")
+    assert train(backend, without, tmp_path / "c", options={"points": "random"}).seeding.count == 100_000
+    assert train(load(), without, tmp_path / "d").seeding == Seeding()
+
+
+def test_a_model_is_drawn_on_the_background_it_was_trained_on(take_views, tmp_path):
+    pink = [0.6130, 0.0101, 0.3984]
+    code = (
+        "import numpy as np; from viewbench.backends import _gaussian_ply as g\n"
+        "one = lambda *shape: np.ones((1, *shape), np.float32)\n"
+        "far = g.Gaussians(1e6 * one(3), one(3), one(4), one(), one(3), one(0, 3))\n"
+        "g.save(__import__('pathlib').Path('splat.ply'), far)"
+    )
+    views = take_views()
+    backend = load(train=python(code), render=[], output="splat.ply", background=pink)
+    train(backend, views, tmp_path / "m")
+    (image,) = backend.render(tmp_path / "m", views.cameras[:1])
+    assert np.allclose(image, pink, atol=1e-6)
+    assert backend.configuration()["render"] != load(render=[], output="splat.ply").configuration()["render"]
+
+
 def test_limits_are_obeyed_where_the_command_line_names_them():
     assert (load().CAPABILITIES.iterations, load().CAPABILITIES.seconds) == (True, False)
     timed = load(train=["true", "{seconds}"], device="cuda").CAPABILITIES
@@ -94,6 +137,10 @@ def test_a_budget_that_the_command_line_needs_is_asked_for(take_views, tmp_path)
         ({"output": "render.png"}, "'output' names one file for all renders"),
         ({"format": "colmop"}, "did you mean 'colmap'"),
         ({"device": "gpu"}, "expected 'cpu' or 'cuda'"),
+        ({"background": [0.1, 0.2]}, "expected red, green and blue"),
+        ({"background": [0.0, 0.0, 255.0]}, "expected red, green and blue"),
+        ({"train": ["python", "/opt/3dgs/train.py", "--eval"]}, "holds out every 8th of the chosen views"),
+        ({"train": ["/3dgs/train.py", "--eval", "--llffhold", "8"]}, "add --llffhold 0"),
     ],
 )
 def test_a_section_that_cannot_work_is_refused_before_anything_runs(changes, message):

@@ -1,0 +1,90 @@
+"""Which version of an external program does the work: its files, its checkout, and the Python packages it runs with."""
+
+import hashlib
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+from ..common.files import sha256_file
+from ..scenes.image_files import is_file
+
+LONGEST_NAME = 4096  # of a path; more is a script in the command line
+SECONDS = 60.0
+LISTING = """
+import importlib.metadata as m, json, sys
+packages = {d.metadata["Name"]: d.version for d in m.distributions()}
+owners = {e.name: e.dist.name for e in m.entry_points(group="console_scripts") if e.dist}
+print(json.dumps({"python": sys.version.split()[0], "packages": packages, "owners": owners}))
+"""
+
+
+def program_version(command: list[str]) -> str:
+    """What the program is that a command line starts, as far as it can be found out without running it.
+
+    A console script is only the door to its package: then name and version of that package come first. Every Python
+    program depends on the packages beside it, a script in a git checkout on the rest of the checkout, and any program
+    on its own files.
+    """
+    files = named_files(command)
+    parts = []
+    python = next((found for file in files if (found := _python_of(file))), None)
+    if python is not None and (listed := _listed(python)) is not None:
+        owner = next((listed["owners"][file.name] for file in files if file.name in listed["owners"]), None)
+        if owner is not None:
+            parts.append(f"{owner} {listed['packages'].get(owner, '?')}")
+        lines = "".join(f"{name}=={version}\n" for name, version in sorted(listed["packages"].items()))
+        parts.append(f"python {listed['python']} with packages {hashlib.sha256(lines.encode()).hexdigest()[:12]}")
+    parts += dict.fromkeys(state for file in files if (state := _checkout(file.resolve().parent)))
+    return ", ".join([*parts, f"sha256:{files_sha256(command)}"])
+
+
+def files_sha256(command: list[str]) -> str:
+    """First 12 hex digits of the SHA-256 over the programs and scripts that a command line names, in any folder."""
+    digest = hashlib.sha256()
+    for file in named_files(command):
+        digest.update(f"{file.name}\0{sha256_file(file)}\0".encode())
+    return digest.hexdigest()[:12]
+
+
+def named_files(command: list[str]) -> list[Path]:
+    """Programs and scripts that a command line names, each once."""
+    files = []
+    for part in dict.fromkeys(command):
+        found = (shutil.which(part) if len(part) < LONGEST_NAME else None) or (part if is_file(Path(part)) else None)
+        if found:
+            files.append(Path(found))
+    return files
+
+
+def _python_of(file: Path) -> str | None:
+    """The interpreter that a file is, or that its first line names."""
+    if file.name.startswith("python"):
+        return str(file)
+    with open(file, "rb") as script:
+        line = script.readline(LONGEST_NAME)
+    words = line[2:].decode("utf-8", "replace").split() if line.startswith(b"#!") else []
+    return next((word for word in reversed(words) if Path(word).name.startswith("python")), None)
+
+
+def _listed(python: str) -> dict | None:
+    try:
+        done = subprocess.run([python, "-c", LISTING], capture_output=True, text=True, timeout=SECONDS, check=True)
+        return json.loads(done.stdout)
+    except (OSError, subprocess.SubprocessError, ValueError):
+        return None
+
+
+def _checkout(folder: Path) -> str | None:
+    """Commit of the git checkout that a folder lies in, and a hash of what was changed since; None outside of one."""
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(folder), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=True).stdout
+
+    try:
+        commit = git("rev-parse", "--short=12", "HEAD").strip()
+        changed = git("diff", "HEAD")
+    except (OSError, subprocess.SubprocessError, UnicodeDecodeError):
+        return None
+    return commit + (f"+{hashlib.sha256(changed.encode()).hexdigest()[:8]}" if changed else "")
