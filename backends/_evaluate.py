@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..common import plugins
+from ..common import gpu, plugins
 from ..common.errors import UserError
 from ..common.files import finite_or_none, read_json, sealed, sha256_file, unsealed, write_json
 from ..common.settings import Settings
@@ -47,6 +47,8 @@ def evaluate(
     scene_hash = scene_sha256(scene)
     check_model(model, train, scene, scene_hash)
     backend = _registry.load(train["backend"], settings)
+    if backend.CAPABILITIES.device == "cuda":
+        gpu.hold(settings.compute.device)
     reason = backend.available()
     if reason:
         raise UserError(f"backend '{train['backend']}' is not available: {reason}")

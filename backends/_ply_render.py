@@ -7,6 +7,7 @@ from types import ModuleType
 
 import numpy as np
 
+from ..common import gpu
 from ..scenes.types import Cameras
 from . import _gaussian_ply
 
@@ -21,6 +22,7 @@ def render_ply(path: Path, cameras: Cameras, background: Sequence[float]) -> Ite
     Raises UserError for a file that is no such PLY.
     """
     gaussians = _gaussian_ply.load(path)
+    gpu.hold()
     gsplat = _module("gsplat").Gsplat()
     reason = gsplat.available()
     if reason is None:

@@ -4,6 +4,7 @@ import hashlib
 import json
 import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
 from ..common.files import sha256_file
@@ -69,8 +70,9 @@ def _python_of(file: Path) -> str | None:
 
 def _listed(python: str) -> dict | None:
     try:
-        done = subprocess.run([python, "-c", LISTING], capture_output=True, text=True, timeout=SECONDS, check=True)
-        return json.loads(done.stdout)
+        # Not in the current folder, where Python would look for packages too.
+        asked = {"cwd": tempfile.gettempdir(), "timeout": SECONDS, "check": True}
+        return json.loads(subprocess.run([python, "-c", LISTING], capture_output=True, text=True, **asked).stdout)
     except (OSError, subprocess.SubprocessError, ValueError):
         return None
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..common import plugins
+from ..common import gpu, plugins
 from ..common.errors import UserError, nearest
 from ..common.files import read_json, sealed, sha256_folder, write_json
 from ..common.provenance import commit, machine
@@ -52,6 +52,7 @@ def train(
     scene, and whatever the backend refuses.
     """
     backend = _registry.load(job.backend, settings)
+    lease = gpu.hold(settings.compute.device) if backend.CAPABILITIES.device == "cuda" else None
     reason = backend.available()
     if reason:
         raise UserError(f"backend '{job.backend}' is not available: {reason}")
@@ -105,6 +106,7 @@ def train(
         shutil.rmtree(work, ignore_errors=True)
         raise UserError(f"backend '{job.backend}' left a file '{taken}', a name of viewbench's own; rename it")
     record = _record(trained, asked, selection, sha256_folder(work / "model"))
+    record["gpu"] = None if lease is None else lease.record()
     _replace_model(work / "model", out)
     write_json(out / "selection.json", sealed(selection))
     record = sealed(record)

@@ -49,7 +49,7 @@ def _stages(study: Study, drawn: dict[str, Style], out: Path) -> Item:
         "the similarity and the choice but not the image features, which a scene needs once; it has a logarithmic "
         "axis, the others start at zero. A greedy order is made once for all ratios, and each has its time. Train "
         "leaves out set-up and the probes behind the curves. Cells that ran at the same time shared the machine."
-        f"{failures_note(study)}"
+        f"{_sharing(study)}{failures_note(study)}"
     )
     return Item("Time per stage", "figure", caption, files)
 
@@ -156,6 +156,15 @@ def _curve(cell: Cell) -> list[tuple[int, float, float]]:
         if point.get("test_psnr_db") is not None
     )
     return list(points)
+
+
+def _sharing(study: Study) -> str:
+    """A sentence where other programs used the GPU while models were trained; nothing where none did."""
+    on_gpu = [gpu for cell in study.done if (gpu := cell.read("train").get("gpu"))]
+    shared = sum(gpu["shared"] is True for gpu in on_gpu)
+    unknown = sum(gpu["shared"] is None for gpu in on_gpu)
+    said = f" {shared} of {len(on_gpu)} models were trained on a GPU that other programs used too." if shared else ""
+    return said + (f" Of {unknown} models nobody can say whether their GPU was shared." if unknown else "")
 
 
 def _seconds(cell: Cell, stage: str) -> float | None:

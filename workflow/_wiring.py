@@ -14,7 +14,7 @@ from snakemake.exceptions import WorkflowError
 
 from ..backends import _evaluate, _registry, _train
 from ..backends._metrics import lpips_sha256
-from ..common import plugins
+from ..common import gpu, plugins
 from ..common.cells import cell_name
 from ..common.errors import UserError
 from ..common.files import sha256_file
@@ -192,8 +192,17 @@ class Wiring:
         options = [str(part) for flag, value in limits.items() if value is not None for part in (flag, value)]
         return shlex.join([*options, "--count-rule", self.study.count, *_set_options(entry.options)])
 
+    def limit(self, workflow: Any) -> None:
+        """Lets as many jobs that need a GPU run at once as this machine has, unless `--resources gpu=N` says how many.
+
+        On a cluster it is for the scheduler to say.
+        """
+        count = len(gpu.devices())
+        if workflow.local_exec and count and "gpu" not in workflow.global_resources:
+            workflow.register_resource("gpu", count)
+
     def gpu(self, wildcards: Any) -> int:
-        """GPUs that a job needs, for `snakemake --resources gpu=1`."""
+        """GPUs that a job needs, one at most."""
         name = self.study.backend(wildcards.backend).backend
         return int(self._backend(name).CAPABILITIES.device == "cuda")
 

@@ -142,8 +142,8 @@ def _check(options: dict[str, Any]) -> None:
 
 
 def configured(argument: str, settings: Settings) -> Gsplat:
-    """The backend on the device that environment.toml names; "auto" is the first CUDA device."""
+    """The backend on the device that environment.toml names: the one that the process holds (common/gpu.py)."""
     if argument:
         raise UserError(f"backend 'gsplat' takes no name behind a colon, got '{argument}'")
     device = settings.compute.device
-    return Gsplat("cuda" if device == "auto" else device)
+    return Gsplat("cuda" if device == "auto" or device.startswith("cuda:") else device)

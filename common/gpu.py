@@ -1,0 +1,128 @@
+"""One GPU a job: which devices there are, and a lock on the one that a process uses.
+
+The lock is on a file, and held until the process ends, however it ends: the kernel gives it back. Programs that the
+process starts see that device alone. Other programs know nothing of the lock; whether any of them used the device at
+the same time is looked up and recorded, since timings of a shared GPU are not those of a free one.
+"""
+
+import contextlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+VISIBLE = "CUDA_VISIBLE_DEVICES"
+FOLDER = "viewbench-gpu"  # in the folder of temporary files: for all users of the machine
+POLL_S = 0.5
+
+
+@dataclass
+class Lease:
+    """A device that is this process's among those of viewbench."""
+
+    device: str  # as CUDA_VISIBLE_DEVICES names it
+    waited_s: float
+    others: int  # programs that used the device when it was taken, of whomever
+    file: int  # descriptor of the lock; -1 where there are no locks
+
+    def record(self) -> dict[str, Any]:
+        """What `train.json` says; `shared` is True where another program used the device too, None if nobody knows."""
+        now = _programs(self.device)
+        shared = None if now is None else self.others > 0 or len(now - {os.getpid()}) > 1
+        said = {key: value for key, value in asdict(self).items() if key in ("device", "waited_s")}
+        return {**said, "shared": shared}
+
+
+_held: Lease | None = None
+
+
+def devices() -> list[str]:
+    """The devices that this process may use: those of CUDA_VISIBLE_DEVICES, or else all that nvidia-smi names."""
+    given = os.environ.get(VISIBLE)
+    if given is not None:
+        names = [name.strip() for name in given.split(",")]
+        usable = names[: names.index("-1")] if "-1" in names else names  # as CUDA reads it
+        return [name for name in usable if name]
+    return list(_identities())
+
+
+def hold(wanted: str = "cuda") -> Lease | None:
+    """Takes a device for as long as this process lives, waiting until one is free; None where there is none.
+
+    Comes before CUDA is first asked for anything, since it reads CUDA_VISIBLE_DEVICES but once. `wanted` is "cuda" or
+    "auto" for any of the devices, or "cuda:N" for one of them; whichever it is, it is the process's only one from then
+    on, and number 0. A second call changes nothing.
+    """
+    global _held
+    if _held is not None or wanted == "cpu":
+        return _held
+    names = devices()
+    _, pinned, number = wanted.partition(":")
+    if pinned:
+        names = names[int(number) : int(number) + 1] if number.isdigit() else []
+    if not names:
+        return None
+    began, told = time.monotonic(), False
+    while True:
+        for name in names:
+            file = _lock(name)
+            if file is not None:
+                busy = _programs(name)
+                _held = Lease(name, round(time.monotonic() - began, 1), len(busy or ()), file)
+                os.environ[VISIBLE] = name
+                return _held
+        if not told:
+            print(f"viewbench: waiting for a GPU ({len(names)} in use by other jobs)", file=sys.stderr, flush=True)
+            told = True
+        time.sleep(POLL_S)
+
+
+def _lock(device: str) -> int | None:
+    """A descriptor that holds the device's lock; None where another process has it."""
+    try:
+        import fcntl
+    except ImportError:
+        return -1
+    folder = Path(tempfile.gettempdir()) / FOLDER
+    with contextlib.suppress(FileExistsError):
+        folder.mkdir()
+        folder.chmod(0o1777)
+    path = folder / _identities().get(device, device).replace("/", "_")
+    with contextlib.suppress(OSError):
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL, 0o666))
+        path.chmod(0o666)
+    file = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(file)
+        return None
+    return file
+
+
+def _identities() -> dict[str, str]:
+    """UUIDs by index: one device has one lock, whichever of its names it is called by."""
+    rows = _asked("--query-gpu=index,uuid")
+    return {row[0]: row[1] for row in rows or () if len(row) == 2}
+
+
+def _programs(device: str) -> set[int] | None:
+    """Numbers of the processes that compute on a device; None where nvidia-smi cannot say."""
+    rows = _asked("--query-compute-apps=gpu_uuid,pid")
+    if rows is None:
+        return None
+    uuid = _identities().get(device, device)
+    return {int(row[1]) for row in rows if len(row) == 2 and row[0] == uuid and row[1].isdigit()}
+
+
+def _asked(query: str) -> list[list[str]] | None:
+    try:
+        command = ["nvidia-smi", query, "--format=csv,noheader"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return [[part.strip() for part in line.split(",")] for line in done.stdout.splitlines() if "," in line]
