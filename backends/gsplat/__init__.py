@@ -35,6 +35,7 @@ class Gsplat:
 
     CAPABILITIES = Capabilities(
         device="cuda",
+        resumes=True,
         deterministic=False,  # the CUDA kernels add gradients up in no fixed order
         options={
             "strategy": "default",  # or "mcmc": 3DGS as Markov chain Monte Carlo
@@ -94,7 +95,7 @@ class Gsplat:
         around = surroundings(data.training, data.points)
         wanted = Wanted(options["points"], options["gaussians"] or None, options["drawn_points"])
         starts, seeding = starting_points(data, wanted, around, np.random.default_rng(seed))
-        task = Task(data, around, seed, budget, options, report)
+        task = Task(data, around, out, seed, budget, options, report)
         gaussians, near, trained = fit(task, starts, self.device, self.rasterizer())
         _gaussian_ply.save(out / MODEL, gaussians)
         write_json(out / RECORD, {"background": options["background"], "near": near})

@@ -1,8 +1,9 @@
 """Fits Gaussians to the chosen views with gsplat's rasteriser and one of its densification strategies."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,11 @@ from .gaussians import (
 )
 from .loss import loss
 from .renderer import Renderer
+from .snapshot import State
 
 SH_EVERY = 1000  # steps of PAPER_STEPS after which one more band of spherical harmonics takes part
 CURVE_POINTS = 20
+SNAPSHOT_S = 60.0  # between snapshots, of which one takes as long as some hundred steps
 RESIDENT_SHARE = 0.25  # of the free GPU memory that images may take; above, each is sent when it is used
 
 
@@ -35,6 +38,7 @@ class Task:
 
     data: TrainingSet
     around: Surroundings
+    out: Path  # where the snapshot is that the run may go on from
     seed: int
     budget: Budget
     options: dict[str, Any]
@@ -48,6 +52,8 @@ def fit(task: Task, starts: list[Start], device: str, rasterize: Callable) -> tu
     Raises UserError when the device's memory is full.
     """
     torch.manual_seed(task.seed)
+    # SSIM's variances are differences of nearly equal numbers, of which TF32's 10 bits leave nothing.
+    torch.backends.cudnn.allow_tf32 = torch.backends.cuda.matmul.allow_tf32 = False
     data, options, extent = task.data, task.options, task.around.extent
     renderer = Renderer(rasterize, device, options["background"], NEAR_PLANE * task.around.nearest)
     params = renderer.parameters(initial(starts, options["strategy"], options["sh_degree"], extent))
@@ -70,35 +76,43 @@ def _run(task: Task, params: Parameters, extent: float, renderer: Renderer) -> d
     steps = task.budget.iterations or PAPER_STEPS
     optims = optimizers(params, extent)
     densification = Densification(task.options, params, optims, extent, steps)
-    decay = torch.optim.lr_scheduler.ExponentialLR(optims["means"], gamma=MEANS_DECAY ** (1 / steps))
+    state = State(np.random.default_rng(task.seed))
+    state.load(task.out, params, optims, densification)
+    decay = MEANS_DECAY ** (1 / steps)
     images = _images(data.images, renderer.device)
-    order = _order(len(data.names), np.random.default_rng(task.seed))
     with torch.no_grad():
         renderer.render(params, data.cameras[0], 0)  # loads the kernels, which is not training
-    clock, done, step = _Clock(renderer.device), False, 0
-    curve: list[dict[str, float | None]] = []
+    clock, done, saved = _Clock(renderer.device, state.seconds), False, time.monotonic()
     while not done:
-        index = next(order)
-        degree = min(task.options["sh_degree"], step * PAPER_STEPS // (SH_EVERY * steps))
+        index = state.next_view(len(data.names))
+        degree = min(task.options["sh_degree"], state.step * PAPER_STEPS // (SH_EVERY * steps))
         image, info = renderer.render(params, data.cameras[index], degree)
         value = loss(image, images[index].to(renderer.device, non_blocking=True))
-        densification.before_backward(step, info)
+        densification.before_backward(state.step, info)
         (value + densification.regularisation()).backward()
         for optimizer in optims.values():
             optimizer.step()
             optimizer.zero_grad(set_to_none=True)
-        decay.step()
-        densification.after_step(step, info)
-        step += 1
-        done = step == steps or (limit is not None and clock.seconds() >= limit)
-        if done or step % max(1, steps // CURVE_POINTS) == 0:
-            seconds = clock.stop()  # what follows is not training
+        optims["means"].param_groups[0]["lr"] *= decay
+        densification.after_step(state.step, info)
+        state.step += 1
+        done = state.step == steps or (limit is not None and clock.seconds() >= limit)
+        reports = done or state.step % max(1, steps // CURVE_POINTS) == 0
+        saves = not done and time.monotonic() - saved >= SNAPSHOT_S
+        if not (reports or saves):
+            continue
+        state.seconds = clock.stop()  # what follows is not training
+        if reports:
             error = float(value.detach())
-            task.report.progress(step, steps, f"loss {error:.4f}, {len(params['means'])} Gaussians")
+            task.report.progress(state.step, steps, f"loss {error:.4f}, {len(params['means'])} Gaussians")
             psnr = _probe(task.report, params, degree, renderer)
-            curve.append({"step": step, "seconds": seconds, "loss": error, "test_psnr_db": psnr})
-            clock.start()
-    return {"iterations": step, "seconds": clock.seconds(), "curve": curve}
+            state.curve.append({"step": state.step, "seconds": state.seconds, "loss": error, "test_psnr_db": psnr})
+        if saves:
+            state.save(task.out, params, optims, densification)
+            saved = time.monotonic()
+        clock.start()
+    State.forget(task.out)
+    return {"iterations": state.step, "seconds": state.seconds, "curve": state.curve}
 
 
 def _probe(report: Report, params: Parameters, degree: int, renderer: Renderer) -> float | None:
@@ -109,9 +123,9 @@ def _probe(report: Report, params: Parameters, degree: int, renderer: Renderer) 
 class _Clock:
     """Seconds of training; waits for the GPU before it is read."""
 
-    def __init__(self, device: str):
+    def __init__(self, device: str, passed: float = 0.0):
         self.device = device
-        self.passed = 0.0
+        self.passed = passed
         self.start()
 
     def start(self) -> None:
@@ -138,9 +152,3 @@ def _images(images: np.ndarray, device: str) -> torch.Tensor:
         return tensor
     free, _ = torch.cuda.mem_get_info(device)
     return tensor.to(device) if tensor.nbytes < RESIDENT_SHARE * free else tensor
-
-
-def _order(count: int, rng: np.random.Generator) -> Iterator[int]:
-    """Endless passes over the views, each in a new random order."""
-    while True:
-        yield from rng.permutation(count).tolist()
