@@ -2,6 +2,7 @@
 
 import re
 import sys
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from viewbench.backends import _registry
 from viewbench.backends._types import Budget, Report, Seeding
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
-from viewbench.common.settings import PACKAGE
+from viewbench.common.settings import PACKAGE, Command
 
 OPTIONS = {"points": "scene"}
 TEN = Budget(iterations=10)
@@ -227,13 +228,18 @@ def test_a_ply_of_gaussians_needs_no_renderer(take_views, tmp_path, degree):
     assert image.max() == pytest.approx(0.5 + 0.2820948, abs=0.02), "the constant band of one, on black"
 
 
-def test_the_examples_that_ship_are_well_formed(tmp_path):
+def examples() -> dict:
+    """The sections [command.NAME] that environment.toml has as comments."""
     lines = (PACKAGE / "environment.toml").read_text(encoding="utf-8").splitlines()
     start = next(number for number, line in enumerate(lines) if line.startswith("# [command."))
     text = [line.removeprefix("# ") for line in lines[start:]]
     written = [line for line in text if re.match(r"""\[command\.|\w+ = |\s*"|#?$""", line)]
-    (tmp_path / "environment.toml").write_text("\n".join(written), encoding="utf-8")
-    settings = settings_file.load(tmp_path / "environment.toml")
+    return tomllib.loads("\n".join(written))["command"]
+
+
+def test_the_examples_that_ship_are_well_formed():
+    commands = {name: Command(**section) for name, section in examples().items()}
+    settings = settings_with(**commands)
     assert set(settings.command) == {"3dgs", "splatfacto", "opensplat"}
     for name in settings.command:
         backend = _registry.load(f"command:{name}", settings)

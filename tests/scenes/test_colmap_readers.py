@@ -4,15 +4,13 @@ Nerfstudio's reader is its own code, imported from its package; what gsplat's ex
 restated here, since no package has it: `examples/datasets/colmap.py` of gsplat and `scene/dataset_readers.py`.
 """
 
-import importlib
-import sys
 from pathlib import Path
-from unittest.mock import MagicMock
 
 import numpy as np
 import pycolmap
 import pytest
 
+from tests.nerfstudio_code import dataparser
 from tests.scenes.test_transforms import frames, write
 from tests.scenes.test_written import colmap, picture
 from viewbench.common.errors import UserError
@@ -84,17 +82,9 @@ def test_gsplat_trains_on_no_test_view(written, factor):
 
 @pytest.fixture(scope="module")
 def nerfstudio():
-    """Nerfstudio's reader; what it imports and does not use to read a capture is stood in for where it is missing."""
-    pytest.importorskip("nerfstudio", reason="nerfstudio is not installed (make dev installs its code alone)")
-    stood_in = {}
-    for name in ("cv2", "viser", "viser.transforms", "appdirs", "newrawpy", "torch.utils.tensorboard"):
-        try:
-            importlib.import_module(name)
-        except ImportError:
-            stood_in[name] = sys.modules[name] = MagicMock()
-    yield importlib.import_module("nerfstudio.data.dataparsers.colmap_dataparser")
-    for name in stood_in:
-        del sys.modules[name]
+    """Nerfstudio's reader."""
+    with dataparser("colmap_dataparser") as module:
+        yield module
 
 
 def nerfstudio_split(module, data: Path, split: str, **options) -> list[str]:
