@@ -3,6 +3,7 @@
 import functools
 import math
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -19,17 +20,16 @@ def ssim(image: np.ndarray, truth: np.ndarray) -> float:
 
     if min(truth.shape[:2]) < 11:
         return math.nan
-    return float(
-        structural_similarity(
-            truth.astype(np.float64),
-            image.astype(np.float64),
-            data_range=1.0,
-            channel_axis=2,
-            gaussian_weights=True,
-            sigma=1.5,
-            use_sample_covariance=False,
-        )
+    mean = structural_similarity(
+        truth.astype(np.float64),
+        image.astype(np.float64),
+        data_range=1.0,
+        channel_axis=2,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
     )
+    return float(cast(np.float64, mean))  # not the tuple that it is when gradients or the map are asked for too
 
 
 @functools.cache

@@ -86,7 +86,7 @@ def _scene(study: Study, backend: str, scene: str, subject: str) -> str:
     if subject not in means:
         return f"{label}: {subject} lacks a score at some ratio, so nothing is concluded."
     averaged = f"on average over the ratios {and_list(map(percent, ratios))}"
-    over = averaged if len(ratios) > 1 else f"at a ratio of {percent(ratios[0])}"
+    over = f"at a ratio of {percent(ratios[0])}" if len(ratios) == 1 else averaged
     sentences = [f"{label}: {subject} scores {number(means[subject], 2)} dB {over}."]
     for baseline in BASELINES:
         found = against(study, backend, scene, subject, baseline)

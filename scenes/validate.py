@@ -28,7 +28,7 @@ def check_scene(scene: Scene) -> None:
 
 def _check_split(scene: Scene, split: Split) -> None:
     cameras = split.cameras
-    bad = ~np.isfinite(cameras.c2w).all(axis=(1, 2))
+    bad = ~np.all(np.isfinite(cameras.c2w), axis=(1, 2))
     if bad.any():
         raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' has NaN or infinite entries")
     with np.errstate(all="ignore"):  # huge numbers in a damaged file overflow, and are found so

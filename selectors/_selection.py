@@ -85,7 +85,7 @@ def check_selection(selection: dict[str, Any], scene: Scene, scene_sha256: str) 
     try:
         indices = np.asarray(selection["indices"], dtype=np.int64)
         n_views, names = int(selection["n_views"]), list(selection["names"])
-        selection["selector"], selection["seed"]
+        _ = selection["selector"], selection["seed"]
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(f"the selection lacks or garbles {error}; make it with `viewbench select`") from None
     made_on = selection.get("scene_sha256", scene_sha256)

@@ -106,7 +106,7 @@ def similarity(
     for factor in factors:
         if factor not in FACTORS:
             raise UserError(f"unknown factor '{factor}'{nearest(factor, FACTORS)} (there are: {', '.join(FACTORS)})")
-    given = dict(zip(FACTORS, (alpha, beta, max(0.0, 1 - alpha - beta)), strict=True))
+    given: dict[str, float] = dict(zip(FACTORS, (alpha, beta, max(0.0, 1 - alpha - beta)), strict=True))
     if given["sem"] < 1e-12:
         given["sem"] = 0.0  # 1 − 0.7 − 0.3 is not quite 0
     usable = [name for name in FACTORS if name in factors and (name != "sem" or views.features is not None)]
@@ -142,7 +142,7 @@ def _inverse_norms(features: np.ndarray) -> np.ndarray:
 def describe(similarity: Similarity, alpha: float, beta: float, factors: Sequence[str]) -> dict[str, object]:
     """What a reader must know of the weights: nothing when they are as given, otherwise what became of them."""
     missing = [name for name in FACTORS if name not in similarity.weights]
-    given = dict(zip(FACTORS, (alpha, beta, 1 - alpha - beta), strict=True))
+    given: dict[str, float] = dict(zip(FACTORS, (alpha, beta, 1 - alpha - beta), strict=True))
     if all(given[name] <= 1e-12 for name in missing):
         return {}
     why = "no image features" if "sem" in missing and "sem" in factors else "as asked"

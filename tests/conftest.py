@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 
@@ -14,6 +15,13 @@ from viewbench.common.settings import PACKAGE
 
 ROOM = PACKAGE / "scenes" / "generated_room" / "human"
 CODE = ("common", "scenes", "selectors", "backends", "reports", "workflow")
+T = TypeVar("T")
+
+
+def known(value: T | None) -> T:
+    """The value, which is there."""
+    assert value is not None
+    return value
 
 
 @pytest.fixture(scope="session")

@@ -33,7 +33,8 @@ class Progress(logging.Handler):
         if event == "RUN_INFO":
             self._plan(getattr(record, "stats", None) or {})
         elif event == "JOB_INFO":
-            self.jobs[record.jobid] = (record.rule_name, list(record.log or []))  # type: ignore[attr-defined]
+            job = vars(record)
+            self.jobs[job["jobid"]] = (job["rule_name"], list(job["log"] or []))
         elif event == "JOB_FINISHED":
             rule, _ = self.jobs.get(getattr(record, "job_id", -1), ("", []))
             if rule in self.finished:

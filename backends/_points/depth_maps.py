@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -104,7 +105,8 @@ def _guess(maps: DepthMaps) -> None:
 
     for depth, sure, guessed in zip(maps.depth, maps.sure, maps.guessed, strict=True):
         if sure.mean() >= LEAST_SURE:
-            row, column = distance_transform_edt(~sure, return_distances=False, return_indices=True)
+            nearest = distance_transform_edt(~sure, return_distances=False, return_indices=True)
+            row, column = cast(np.ndarray, nearest)
             depth[:] = depth[row, column]
             guessed[:] = ~sure
 

@@ -70,10 +70,10 @@ class Gsplat:
         Raises UserError when there is no compiler, or it fails.
         """
         try:
-            from gsplat.cuda._backend import _C
+            from gsplat.cuda import _backend
         except (ImportError, OSError, RuntimeError) as error:
             raise UserError(f"gsplat's CUDA code could not be compiled: {error}; {REMEDY}") from None
-        if _C is None:
+        if _backend._C is None:
             raise UserError(NOT_COMPILED)
 
     def version(self) -> str:

@@ -25,7 +25,7 @@ class Densification:
             return max(least, round(step * steps / PAPER_STEPS))
 
         self.kind, self.most = options["strategy"], options["gaussians"]
-        shared = {"refine_start_iter": squeezed(500), "refine_every": squeezed(100, LEAST_REFINE)}
+        shared: dict[str, Any] = {"refine_start_iter": squeezed(500), "refine_every": squeezed(100, LEAST_REFINE)}
         self.strategy: Any
         if self.kind == "mcmc":
             self.strategy = MCMCStrategy(cap_max=self.most or MCMC_CAP, refine_stop_iter=squeezed(25_000), **shared)

@@ -24,7 +24,7 @@ def initial(starts: list[Start], strategy: str, degree: int, extent: float) -> G
 
     extent: scene units, the size where a point has no neighbour.
     """
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     xyz = np.concatenate([start.points for start in starts])
     colours = np.concatenate([start.colours for start in starts])
@@ -33,7 +33,7 @@ def initial(starts: list[Start], strategy: str, degree: int, extent: float) -> G
     opacity = np.concatenate([np.full(len(start), min(own, FAINT.get(start.kind, own))) for start in starts])
     distances = np.full((count, 1), extent)
     if count > 1:
-        distances = cKDTree(xyz).query(xyz, k=min(NEIGHBOURS + 1, count))[0][:, 1:]
+        distances = KDTree(xyz, leafsize=16).query(xyz, k=min(NEIGHBOURS + 1, count))[0][:, 1:]
     size = np.maximum(np.sqrt((distances**2).mean(axis=1)), 1e-7 * extent)  # doubled points have distance 0
     return Gaussians(
         means=xyz.astype(np.float32),

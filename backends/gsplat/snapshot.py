@@ -44,7 +44,7 @@ class State:
             arrays["torch.cuda"] = torch.cuda.get_rng_state()
         plain: dict[str, Any] = {name: getattr(self, name) for name in ("step", "seconds", "order", "curve")}
         plain |= {"rng": self.rng.bit_generator.state, "rate": optims["means"].param_groups[0]["lr"]}
-        stored = {name: value.cpu().numpy() for name, value in arrays.items()}
+        stored: dict[str, Any] = {name: value.cpu().numpy() for name, value in arrays.items()}
         with whole(folder / FILE) as temporary, open(temporary, "wb") as file:
             np.savez(file, plain=json.dumps(plain), **stored)
 

@@ -47,9 +47,9 @@ def _gaussians(starts: list[Start], scales: np.ndarray, o: Options) -> np.ndarra
 
 def spacing(points: np.ndarray) -> np.ndarray:
     """(N,) root mean square distance to the three nearest neighbours, as 3DGS sets its first scales."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     if len(points) < 4:
         return np.linalg.norm(points - points.mean(axis=0), axis=1)
-    distance, _ = cKDTree(points).query(points, k=4)
+    distance, _ = KDTree(points, leafsize=16).query(points, k=4)
     return np.sqrt((distance[:, 1:] ** 2).mean(axis=1))

@@ -17,10 +17,10 @@ SAMPLES = 16  # rows and columns of pixels taken of each view
 
 def shell(data: TrainingSet, count: int, around: Surroundings) -> tuple[np.ndarray, np.ndarray, float]:
     """(count, 3) positions, (count, 3) colours in [0, 1], and the Gaussians' standard deviation in scene units."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     directions = _even(count)
-    tree = cKDTree(directions)
+    tree = KDTree(directions, leafsize=16)  # with other leaves, another of two equally near
     cameras = data.cameras
     k, height, width, _ = data.images.shape
     rows = np.unique(np.linspace(0, height - 1, min(SAMPLES, height)).astype(np.int64))
@@ -39,7 +39,8 @@ def shell(data: TrainingSet, count: int, around: Surroundings) -> tuple[np.ndarr
     colours[known] = total[known] / seen[known, None]
     if not known.all():
         k_nearest = min(8, int(known.sum()))
-        distance, nearest = cKDTree(directions[known]).query(directions[~known], k=[*range(1, k_nearest + 1)])
+        found = KDTree(directions[known], leafsize=16).query(directions[~known], k=k_nearest)
+        distance, nearest = (part.reshape(-1, k_nearest) for part in found)  # the axis of a single neighbour is dropped
         weight = 1 / (distance + 1e-3)
         colours[~known] = (colours[known][nearest] * weight[..., None]).sum(1) / weight.sum(1, keepdims=True)
     radius = RADIUS * around.extent

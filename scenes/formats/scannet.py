@@ -30,7 +30,7 @@ def read(root: Path) -> Scene:
         raise UserError(f"'{root / 'color'}' has no images; export the scan with its colour frames")
     files = [root / "pose" / f"{path.stem}.txt" for path in images]
     poses = np.stack([matrix(path, "pose") for path in files])
-    found = np.isfinite(poses).all(axis=(1, 2))
+    found = np.all(np.isfinite(poses), axis=(1, 2))
     if not found.any():
         raise UserError(f"'{root}': none of the {len(images)} frames has a finite pose")
     camera = root / "intrinsic" / "intrinsic_color.txt"

@@ -63,7 +63,7 @@ def _sequences(root: Path, folders: list[Path], notes: list[str]) -> Split:
         raise UserError(f"'{root}' has no *.color.png beside its poses")
     files = [path.with_name(path.name.replace(".color.png", ".pose.txt")) for path in images]
     poses = np.stack([matrix(path, "pose") for path in files])
-    found = np.isfinite(poses).all(axis=(1, 2))
+    found = np.all(np.isfinite(poses), axis=(1, 2))
     if not found.any():
         raise UserError(f"'{root}': none of the {len(images)} frames has a finite pose")
     if not found.all():

@@ -37,7 +37,7 @@ def read(root: Path, allow_outside: bool = False) -> Scene:
     Raises UserError for files that are missing or not as documented.
     """
     if (root / SINGLE).is_file():
-        files = {"train": root / SINGLE}
+        files: dict[str, Path] = {"train": root / SINGLE}
     else:
         held = [root / name for name in TESTS if (root / name).is_file()]
         files = dict(zip(("train", "test", "spare"), [root / TRAIN, *held], strict=False))

@@ -71,6 +71,7 @@ def _upright(frame: Any) -> Any:
 def _frames(root: Path) -> Iterator[Any]:
     try:
         import av
+        from av.error import FFmpegError
     except ImportError:
         raise UserError("reading a video needs PyAV: pip install 'viewbench[video]'") from None
     try:
@@ -79,7 +80,7 @@ def _frames(root: Path) -> Iterator[Any]:
                 raise UserError(f"'{root}' has no video in it")
             container.streams.video[0].thread_type = "AUTO"
             yield from container.decode(video=0)
-    except (av.FFmpegError, ValueError, OSError) as error:
+    except (FFmpegError, ValueError, OSError) as error:
         raise UserError(f"video '{root}' cannot be decoded: {error}") from None
 
 

@@ -80,7 +80,8 @@ class Testbed:
         self.nerf = _Nerf()
         self.training_step, self.loss, self.shall_train, self.fov_axis = 0, 1.0, False, 1
         self.background_color, self.exposure = [0.0, 0.0, 0.0, 1.0], 0.0
-        self._root_dir = self._dataset = self._network = None
+        self._root_dir = self._network = None
+        self._dataset = {}
         self._network_path = "base.json"
 
     @property
@@ -103,7 +104,7 @@ class Testbed:
         assert isinstance(path, str)
         if path and (self._find_network(path).exists() or not Path(self._network_path).exists()):
             self._network_path = path
-        if self._dataset is None:
+        if not self._dataset:
             return  # no mode yet
         found = self._find_network(self._network_path)
         if found.exists():
@@ -135,7 +136,7 @@ class Testbed:
         self._dataset = {"aabb_scale": side, "frames": frames}
 
     def frame(self):
-        if self.shall_train and self._dataset is None:
+        if self.shall_train and not self._dataset:
             self.shall_train = False
         if self.shall_train:
             if self._network is None:

@@ -37,7 +37,7 @@ def test_selected_points_are_those_that_two_chosen_views_see(take_views):
 def test_random_points_lie_around_all_training_cameras_whichever_were_chosen(take_views):
     views = take_views()
     draws = [points_of(views, "random", np.random.default_rng(4), drawn=500)[0] for _ in range(2)]
-    assert np.array_equal(*draws)
+    assert np.array_equal(draws[0], draws[1])
     low, high = views.training.positions.min(axis=0), views.training.positions.max(axis=0)
     margin = 0.5 * (high - low).max()
     assert np.all((draws[0] >= low - margin) & (draws[0] <= high + margin))

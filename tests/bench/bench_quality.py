@@ -25,6 +25,7 @@ from viewbench.backends._types import Budget, Report, TrainingSet  # noqa: E402
 from viewbench.common.settings import load as load_settings  # noqa: E402
 from viewbench.scenes.images import load_images  # noqa: E402
 from viewbench.scenes.load import open_scene  # noqa: E402
+from viewbench.scenes.types import Cameras  # noqa: E402
 
 PLAIN = (
     "points:scene,gaussians:20000,shell:0,low_pass:0.3,antialias:false,opacity:0.5,scale:0.6,rate_mean:6e-4,"
@@ -55,7 +56,7 @@ def options(text: str) -> dict:
     return chosen
 
 
-def views(name: str, width: int, share: float, holdout: str | None) -> tuple[TrainingSet, np.ndarray, object]:
+def views(name: str, width: int, share: float, holdout: str | None) -> tuple[TrainingSet, np.ndarray, Cameras]:
     """The chosen share of a scene's training views, and its test views' images and cameras."""
     scene = open_scene(name, load_settings(), holdout=holdout)
     count = len(scene.train)
@@ -66,13 +67,13 @@ def views(name: str, width: int, share: float, holdout: str | None) -> tuple[Tra
     return data, *load_images(scene.test, np.arange(len(scene.test)), width)
 
 
-def others(name: str, width: int) -> tuple[np.ndarray, object]:
+def others(name: str, width: int) -> tuple[np.ndarray, Cameras]:
     """Images and cameras of evenly spaced training frames of another scene."""
     split = open_scene(name, load_settings()).train
     return load_images(split, np.unique(np.linspace(3, len(split) - 4, VALIDATION_VIEWS).astype(np.int64)), width)
 
 
-def measure(data: TrainingSet, truth: np.ndarray, cameras: object, seconds: float, seed: int, chosen: dict) -> list:
+def measure(data: TrainingSet, truth: np.ndarray, cameras: Cameras, seconds: float, seed: int, chosen: dict) -> list:
     """PSNR in dB, steps, Gaussians, and the seconds before the first step, of one run."""
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
@@ -85,7 +86,7 @@ def measure(data: TrainingSet, truth: np.ndarray, cameras: object, seconds: floa
 
 def main() -> None:
     """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).split("\n")[0])
     parser.add_argument("--scene", default="room_human")
     parser.add_argument("--holdout", help="for a scene without a test split, such as every:8")
     parser.add_argument("--validate", help="score on training frames of this scene")

@@ -134,6 +134,7 @@ def slow_coverage(views: Views, count: int, choice: Choice) -> tuple[float, str]
     weight = coverage.bin_weights(kernels.POLAR, kernels.AZIMUTH)
     seen, bins = np.empty(len(nodes), np.int64), np.empty(len(nodes), np.uint8)
     assert views.intrinsics is not None
+    assert choice.gains is not None
     observed = []
     for place, rotation, camera in zip(views.positions, views.rotations, views.intrinsics, strict=True):
         size = kernels.observe(nodes, place, rotation, camera, seen, bins)
@@ -240,7 +241,7 @@ def main(quick: bool) -> None:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).split("\n", 1)[0])
     parser.add_argument("--quick", action="store_true", help="smaller scenes, under a minute")
     parser.add_argument("--one", nargs=5, help=argparse.SUPPRESS)
     given = parser.parse_args()

@@ -104,7 +104,7 @@ print(next(line.split()[1] for line in open("/proc/self/status") if line.startsw
 
 def main() -> None:
     """Prints the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).split("\n")[0])
     parser.add_argument("--quick", action="store_true", help="fewer sizes and repeats, about a minute")
     quick = parser.parse_args().quick
     counts, sizes = ((2_000, 10_000), (96, 128)) if quick else (COUNTS, SIZES)

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import known
 from viewbench.common import gpu
 
 JOB = """
 import os, sys, time
 from pathlib import Path
+from tests.conftest import known
 from viewbench.common import gpu
 lease = gpu.hold(sys.argv[3] if len(sys.argv) > 3 else "cuda")
 name = os.environ["CUDA_VISIBLE_DEVICES"]
@@ -64,7 +66,7 @@ def test_three_jobs_on_two_devices(two):
     taken = {name: appears(two / f"{name}.start").split()[0] for name in "ab"}
     assert set(taken.values()) == {"0", "1"}, "side by side they get different devices"
     jobs["c"] = start(two, "c")
-    assert "waiting for a GPU (2 in use by other jobs)" in jobs["c"].stderr.readline()
+    assert "waiting for a GPU (2 in use by other jobs)" in known(jobs["c"].stderr).readline()
     assert not (two / "c.start").exists()
     (two / "b.go").touch()
     device, began = appears(two / "c.start").split()
@@ -81,7 +83,7 @@ def test_a_job_that_is_killed_gives_its_device_back(two):
     first = start(two, "a", CUDA_VISIBLE_DEVICES="1")
     appears(two / "a.start")
     second = start(two, "b", CUDA_VISIBLE_DEVICES="1")
-    assert "waiting" in second.stderr.readline()
+    assert "waiting" in known(second.stderr).readline()
     first.send_signal(signal.SIGKILL)
     assert appears(two / "b.start").split()[0] == "1"
     (two / "b.go").touch()
@@ -95,7 +97,7 @@ def test_one_device_has_one_lock_by_whichever_name(two):
     second = start(two, "b")
     assert appears(two / "b.start").split()[0] == "0"
     third = start(two, "c", CUDA_VISIBLE_DEVICES="1")
-    assert "waiting" in third.stderr.readline()
+    assert "waiting" in known(third.stderr).readline()
     for name in "abc":
         (two / f"{name}.go").touch()
     assert [job.wait(20) for job in (first, second, third)] == [0, 0, 0]

@@ -2,6 +2,7 @@ import json
 
 import pytest
 
+from tests.conftest import known
 from viewbench.common.errors import UserError
 from viewbench.common.settings import Tracking
 from viewbench.reports import _tracking
@@ -54,7 +55,7 @@ def runs_of(tracking):
     from mlflow import MlflowClient
 
     client = MlflowClient(tracking_uri=tracking.uri)
-    experiment = client.get_experiment_by_name("demo")
+    experiment = known(client.get_experiment_by_name("demo"))
     return client, client.search_runs([experiment.experiment_id])
 
 
@@ -64,7 +65,7 @@ def test_one_finished_run_a_cell_however_often(store):
     assert _tracking.track("demo", ROWS, results, tracking) == {"logged": 1, "kept": 3}
     assert _tracking.track("demo", ROWS, results, tracking) == {"logged": 0, "kept": 4}
     client, runs = runs_of(tracking)
-    assert sorted(run.info.run_name for run in runs) == [
+    assert sorted(known(run.info.run_name) for run in runs) == [
         "room/maxmin/0.1/0",
         "room/maxmin/0.1/1",
         "room/random/0.1/0",

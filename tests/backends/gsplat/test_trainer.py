@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.backends.gsplat import kernels
+from tests.conftest import known
 from viewbench.backends import _gaussian_ply, gsplat
 from viewbench.backends._points import Start
 from viewbench.backends._psnr import psnr_db
@@ -73,8 +74,8 @@ def test_gaussians_are_added_and_their_optimizers_follow(take_views, tmp_path, s
 def test_growth_ends_where_there_are_enough(take_views, tmp_path):
     views, options = take_views(width=24), {"points": "scene", "steps": 80}
     assert train(views, tmp_path / "a", strategy="mcmc", gaussians=205, **options).n_primitives == 205
-    assert train(views, tmp_path / "b", gaussians=150, **options).n_primitives <= 150
-    assert train(views, tmp_path / "c", **options).n_primitives > 200
+    assert known(train(views, tmp_path / "b", gaussians=150, **options).n_primitives) <= 150
+    assert known(train(views, tmp_path / "c", **options).n_primitives) > 200
 
 
 def test_opacities_are_reset_on_schedule(take_views):
@@ -137,8 +138,8 @@ def test_curve_and_seconds_leave_the_probe_out(take_views, tmp_path):
     trained = train(views, tmp_path / "m", steps=20, report=Report(probe=probe), drawn_points=10)
     assert [point["step"] for point in trained.curve] == list(range(1, 21))
     assert trained.seconds < 20 * 0.2
-    assert all(np.isfinite(point["test_psnr_db"]) for point in trained.curve)
-    assert np.all(np.diff([point["seconds"] for point in trained.curve]) > 0)
+    assert all(np.isfinite(known(point["test_psnr_db"])) for point in trained.curve)
+    assert np.all(np.diff([known(point["seconds"]) for point in trained.curve]) > 0)
 
 
 def test_seconds_end_a_run(take_views, tmp_path):
@@ -186,8 +187,8 @@ def test_full_memory_is_said_to_be_so(take_views, tmp_path):
 def test_absent_cuda_is_explained():
     if torch.cuda.is_available():
         pytest.skip("there is a CUDA device here")
-    assert "CUDA" in gsplat.Gsplat().available()
-    assert "[compute] device is 'cpu'" in gsplat.Gsplat(device="cpu").available()
+    assert "CUDA" in known(gsplat.Gsplat().available())
+    assert "[compute] device is 'cpu'" in known(gsplat.Gsplat(device="cpu").available())
     assert gsplat.Gsplat().version().startswith("gsplat 1.")
     with pytest.raises(UserError, match="install a CUDA toolkit"):
         gsplat.Gsplat().warm()

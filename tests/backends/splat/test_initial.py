@@ -283,7 +283,7 @@ def test_points_along_rays_project_onto_their_pixels(walk):
     data, _ = walk
     start = along_rays(data, 200, 3.0, np.random.default_rng(3))
     points, colours = start.points, start.colours
-    inside = 0
+    inside = np.zeros(200, int)
     for camera, image in zip(data.cameras, data.images, strict=True):
         x, y, z = (np.c_[points, np.ones(200)] @ camera.world_to_camera()[0].T)[:, :3].T
         column = np.floor(camera.fx[0] * x / z + camera.cx[0] + 1e-9)

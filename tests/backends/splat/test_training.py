@@ -5,6 +5,7 @@ import pytest
 from plyfile import PlyData
 
 from tests.backends.splat.test_kernels import cloud
+from tests.conftest import known
 from viewbench.backends import splat
 from viewbench.backends._psnr import psnr_db
 from viewbench.backends._types import Budget, Report, TrainingSet
@@ -43,7 +44,7 @@ def data():
     return TrainingSet("toy", tuple(map(str, range(9))), seen, images, points, np.arange(9), seen)
 
 
-def run(data, folder, iterations=200, seed=1, seconds=None, **options):
+def run(data, folder, iterations: int | None = 200, seed=1, seconds=None, **options):
     folder.mkdir(parents=True, exist_ok=True)
     chosen = {**splat.CAPABILITIES.options, **options}
     return splat.train(data, folder, seed, Budget(iterations, seconds), chosen, Report())
@@ -58,8 +59,9 @@ def test_training_makes_the_pictures_better(data, tmp_path):
     record = run(data, tmp_path / "long", 300)
     run(data, tmp_path / "short", 5)
     assert score(tmp_path / "long", data) > score(tmp_path / "short", data) + 5
-    assert record.curve[-1]["loss"] < 0.5 * record.curve[0]["loss"]
-    assert [point["step"] for point in record.curve] == sorted({point["step"] for point in record.curve})
+    assert known(record.curve[-1]["loss"]) < 0.5 * known(record.curve[0]["loss"])
+    steps = [known(point["step"]) for point in record.curve]
+    assert steps == sorted(set(steps))
     assert record.iterations == 300
     assert record.seeding.source.startswith("scene")
 
@@ -88,7 +90,7 @@ def test_a_killed_run_ends_in_the_same_bytes(data, tmp_path, monkeypatch, smalle
         with pytest.raises(KeyboardInterrupt):
             run(data, tmp_path / "killed", 120)
     assert not (tmp_path / "killed" / "model.ply").exists()
-    assert State.load(tmp_path / "killed").step == 60
+    assert known(State.load(tmp_path / "killed")).step == 60
     run(data, tmp_path / "killed", 120)
     assert (tmp_path / "killed" / "model.ply").read_bytes() == (tmp_path / "whole" / "model.ply").read_bytes()
     assert sorted(path.name for path in (tmp_path / "killed").iterdir()) == ["model.ply", "splat.json"]
