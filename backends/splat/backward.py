@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from ...common.kernels import compiled
 from .harmonics import MOST, colour, fill_basis
-from .kernels import HALF, ONE, TWO, ZERO, F, compiled, exp, sigmoid
+from .kernels import HALF, ONE, TWO, ZERO, F, exp, sigmoid
 from .layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0
 from .projection import (
     FAINTEST,

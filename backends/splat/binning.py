@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from .kernels import HALF, ONE, ZERO, F, compiled
+from ...common.kernels import compiled
+from .kernels import HALF, ONE, ZERO, F
 from .projection import (
     CONIC_A,
     CONIC_B,

@@ -8,7 +8,8 @@ B₁ = µ² + µ_y² + C₁, B₂ = E - µ² + var_y + C₂, and ∂/∂x = blur
 
 import numpy as np
 
-from .kernels import ONE, TWO, ZERO, F, compiled
+from ...common.kernels import compiled
+from .kernels import ONE, TWO, ZERO, F
 
 RADIUS = 5
 C1, C2 = F(1e-4), F(9e-4)

@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from .kernels import HALF, ONE, ZERO, F, compiled
+from ...common.kernels import compiled
+from .kernels import HALF, ONE, ZERO, F
 
 PATCH = 2  # patches reach so many pixels to each side
 FLAT = 1e-4  # added to variances: patches without texture, which match everywhere, do not match

@@ -15,9 +15,10 @@ gradient to the mean, which is what 3DGS's own kernels leave in and what makes n
 
 import numpy as np
 
+from ...common.kernels import compiled, inlined
 from ...scenes.types import OPENCV, Cameras
 from .harmonics import MOST, colour, fill_basis
-from .kernels import HALF, LOG2E, ONE, TWO, ZERO, F, compiled, exp, inlined, sigmoid
+from .kernels import HALF, LOG2E, ONE, TWO, ZERO, F, exp, sigmoid
 from .layout import LOG_SCALE, LOGIT, MEAN, QUATERNION
 
 FAINTEST = F(2.5e-5)  # of the squared factor that `antialias` multiplies opacities by

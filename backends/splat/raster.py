@@ -9,8 +9,9 @@ from the forward pass, so the part of it that lies behind splat i is found by su
 
 import numpy as np
 
+from ...common.kernels import compiled
 from .binning import TILE
-from .kernels import HALF, ONE, ZERO, F, compiled, exp2_8
+from .kernels import HALF, ONE, ZERO, F, exp2_8
 from .projection import BLUE, GREEN, LOG2_OPACITY, MIN_ALPHA_LOG2, RED, A, B, C, X, Y
 
 PIXELS = TILE * TILE
