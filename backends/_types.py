@@ -13,6 +13,8 @@ and, where a study has to know more to run again what changed,
     configuration() -> {"train": {...}, "render": {...}}     settings of the machine that models, and renders, depend on
     RENDERERS: tuple[str, ...]                               modules beside its own that draw its models
 
+and, where it compiles something, `warm() -> None`, which does so, into a cache: a study calls it once before training.
+
 `train` fills the empty folder `out`, and nothing outside it; the caller moves `out` into place when it returns.
 Evaluation is shared (`_evaluate.py`): a backend never sees a test image and never scores itself.
 """

@@ -47,19 +47,17 @@ def source_name(package: str, name: str) -> str:
 
 def summary(package: str, name: str) -> str:
     """First line of the plug-in's docstring, read without importing it."""
-    spec = importlib.util.find_spec(module_name(package, name))
-    if spec is None or spec.origin is None:
-        return ""
-    docstring = ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8")))
-    return (docstring or "").split("\n", 1)[0]
+    return (ast.get_docstring(_parsed(package, name)) or "").split("\n", 1)[0]
+
+
+def defines(package: str, name: str, function: str) -> bool:
+    """Whether the plug-in has this function at its top level, found out without importing it."""
+    return any(isinstance(node, ast.FunctionDef) and node.name == function for node in _parsed(package, name).body)
 
 
 def constant(package: str, name: str, variable: str, default: object = None) -> object:
     """Value of a literal that the plug-in assigns at its top level, read without importing it."""
-    spec = importlib.util.find_spec(module_name(package, name))
-    if spec is None or spec.origin is None:
-        return default
-    for node in ast.parse(Path(spec.origin).read_text(encoding="utf-8")).body:
+    for node in _parsed(package, name).body:
         if isinstance(node, ast.Assign):
             targets, value = node.targets, node.value
         elif isinstance(node, ast.AnnAssign) and node.value is not None:
@@ -69,3 +67,10 @@ def constant(package: str, name: str, variable: str, default: object = None) -> 
         if any(isinstance(target, ast.Name) and target.id == variable for target in targets):
             return ast.literal_eval(value)
     return default
+
+
+def _parsed(package: str, name: str) -> ast.Module:
+    """The plug-in's source; an empty one where there is no such plug-in."""
+    spec = importlib.util.find_spec(module_name(package, name))
+    source = Path(spec.origin).read_text(encoding="utf-8") if spec and spec.origin else ""
+    return ast.parse(source)

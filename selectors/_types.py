@@ -8,6 +8,11 @@ a larger one, so that one run serves every ratio, `FACTORS` names the factors of
     select(views: Views, count: int, rng: numpy.random.Generator, **parameters) -> Choice
 
 chooses. It may raise UserError. Everything else (normalisation, features, the count) is decided before it is called.
+A selector that compiles something may have
+
+    warm() -> None
+
+which does so, into a cache: a study calls it once before several jobs choose by it.
 """
 
 from collections.abc import Mapping

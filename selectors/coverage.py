@@ -21,6 +21,13 @@ GROWTH = 0.2  # of the bounding box, on each side
 TIE = 1e-9  # gains that differ by less are the same: many views see equally many regions, but for rounding
 
 
+def warm() -> None:
+    """Compiles the kernels into numba's cache; a second call takes a fraction of a second."""
+    from . import _coverage_kernels as kernels
+
+    kernels.warm()
+
+
 def select(views: Views, count: int, rng: np.random.Generator, lam: float = 0.05, spacing: float = 0.5) -> Choice:
     """Greedy by the gain that the Uniform Coverage Function defines, ties to the earlier frame.
 
@@ -39,43 +46,26 @@ def select(views: Views, count: int, rng: np.random.Generator, lam: float = 0.05
         raise UserError("'coverage' needs the cameras' intrinsics to know what they see; use another selector")
     if not (lam > 0 and spacing > 0):
         raise UserError(f"lam = {lam} and spacing = {spacing} must be positive")
+    kernels.warm()  # which is no part of choosing
     begin = time.perf_counter()
     nodes = regions(views.positions, spacing)
     positions, rotations, cameras = map(np.ascontiguousarray, (views.positions, views.rotations, views.intrinsics))
-    starts, viewers, bins = kernels.observers(nodes, positions, rotations, cameras)
+    observers = kernels.observers(nodes, positions, rotations, cameras)
     prepared = time.perf_counter()
 
-    weight = bin_weights(kernels.POLAR, kernels.AZIMUTH)
-    counts = np.zeros(len(nodes), dtype=np.int64)
-    mass = np.zeros((len(nodes), kernels.BINS))
-    present = np.zeros(len(nodes))
-    table = np.full((len(nodes), kernels.BINS), 1 / kernels.BINS)  # 1 − TV of a region seen once
-    of_count = np.bincount(viewers, minlength=len(views)).astype(np.float64)  # 1^λ − 0^λ for each region seen
-    of_angle = of_count / kernels.BINS
+    lam, weight = float(lam), bin_weights(kernels.POLAR, kernels.AZIMUTH)
+    state, gain = kernels.Regions.unseen(len(nodes)), kernels.Gains.at_first(observers, len(views))
     gone = np.zeros(len(views))
-    seen, seen_bins = np.empty(len(nodes), np.int64), np.empty(len(nodes), np.uint8)
+    seen = kernels.Seen.room(len(nodes))
     chosen = np.empty(count, dtype=np.int64)
     gains = np.empty(count)
     for k in range(count):
-        total = (k + 1) ** -lam * ((counts[counts > 0] ** lam).sum() + of_count) + present.sum() + of_angle + gone
+        of_count = (state.counts[state.counts > 0] ** lam).sum() + gain.of_count
+        total = (k + 1) ** -lam * of_count + state.present.sum() + gain.of_angle + gone
         pick = int((total >= total.max() - TIE).argmax())
         chosen[k], gains[k], gone[pick] = pick, total[pick], -np.inf
-        size = kernels.observe(nodes, positions[pick], rotations[pick], cameras[pick], seen, seen_bins)
-        kernels.add(
-            seen[:size],
-            seen_bins[:size],
-            lam,
-            weight,
-            counts,
-            mass,
-            present,
-            table,
-            starts,
-            viewers,
-            bins,
-            of_count,
-            of_angle,
-        )
+        size = kernels.observe(nodes, positions[pick], rotations[pick], cameras[pick], seen)
+        kernels.add(seen.first(size), lam, weight, state, observers, gain)
     seconds = {"similarity": prepared - begin, "select": time.perf_counter() - prepared}
     return Choice(chosen, gains, seconds, {"regions": len(nodes)})
 

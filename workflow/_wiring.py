@@ -116,9 +116,24 @@ class Wiring:
 
     def choosing(self, wildcards: Any) -> str:
         """What a selection depends on besides scene, features and options."""
-        selector = self.study.selector(wildcards.selector).selector
+        return self._choosing(self.study.selector(wildcards.selector).selector)
+
+    def _choosing(self, selector: str) -> str:
         modules = ("workflow.commands.select", *_run.modules_of(selector))
         return self.lists.path(f"select-{selector}", modules, packages=CHOOSING)
+
+    def choosing_compiled(self, wildcards: Any) -> str:
+        """What the selections depend on that wait for `plugin` to be compiled."""
+        return self._choosing(wildcards.plugin)
+
+    def warm_selector(self, wildcards: Any) -> list[str]:
+        """The file that says that the selector is compiled, where it compiles anything."""
+        selector = self.study.selector(wildcards.selector).selector
+        return [f"{self.results}/warm_selectors/{selector}"] if self._compiles(selector) else []
+
+    @functools.cache  # noqa: B019
+    def _compiles(self, selector: str) -> bool:
+        return plugins.defines("selectors", selector, "warm")
 
     def selection(self, wildcards: Any) -> str:
         """The file with a cell's choice: one for all ratios of a tier where the order is greedy, one for all backends

@@ -9,8 +9,10 @@ import math
 
 import numpy as np
 
-from ..splat.kernels import HALF, ONE, ZERO, F, compiled
+from ...common.kernels import compiled
 
+F = np.float32
+ZERO, HALF, ONE = F(0), F(0.5), F(1)
 PATCH = 2  # patches reach so many pixels to each side
 FLAT = 1e-4  # added to variances: patches without texture, which match everywhere, do not match
 LEAST_INSIDE = 0.6  # of a patch's pixels

@@ -1,9 +1,12 @@
 """Gradients of the parameters from those of the (splat, tile) pairs: the projection of projection.py, in reverse."""
 
+from typing import NamedTuple
+
 import numpy as np
 
+from ...common.kernels import compiled
 from .harmonics import MOST, colour, fill_basis
-from .kernels import HALF, ONE, TWO, ZERO, F, compiled, exp, sigmoid
+from .kernels import HALF, ONE, TWO, ZERO, F, exp, sigmoid
 from .layout import LOG_SCALE, LOGIT, MEAN, QUATERNION, SH0
 from .projection import (
     FAINTEST,
@@ -21,20 +24,46 @@ from .projection import (
 )
 
 
+class Moments(NamedTuple):
+    """What Adam remembers of the gradients."""
+
+    first: np.ndarray  # (rows, N) float32, their running mean
+    second: np.ndarray  # (rows, N) float32, that of their squares
+
+    @classmethod
+    def zeros(cls, gaussians: np.ndarray) -> "Moments":
+        """Of (rows, N) parameters that have not moved yet."""
+        return cls(np.zeros_like(gaussians), np.zeros_like(gaussians))
+
+
+class Rates(NamedTuple):
+    """What Adam goes by in one step."""
+
+    rows: np.ndarray  # (rows,) float32, how far a step goes in each parameter
+    correction_1: np.float32  # 1 / (1 - β₁ᵗ), t the number of the step
+    correction_2: np.float32  # 1 / (1 - β₂ᵗ)
+
+    @classmethod
+    def of_step(cls, number: int, rows: np.ndarray) -> "Rates":
+        """Of a step that counts from 1."""
+        return cls(rows.astype(np.float32, copy=False), F(1 / (1 - 0.9**number)), F(1 / (1 - 0.999**number)))
+
+
 @compiled
-def project_backward(g, n, cam, degree, low_pass, antialias, first_slot, slots, pair_gradient, out):
-    """Fills out (rows, N) for the first n Gaussians; those without pairs get zeros."""
+def project_backward(g, view, slots, pair_gradient, out):
+    """Fills out (rows, at least N) for Gaussians g (rows, N); those without pairs get zeros."""
+    cam, degree, _, low_pass, antialias = view
     fx, fy = cam[FX], cam[FY]
     limit_x, limit_y = HALF * MARGIN * cam[WIDTH] / fx, HALF * MARGIN * cam[HEIGHT] / fy
     sums = np.empty(9, np.float32)
     basis, count = np.empty(MOST, np.float32), (degree + 1) * (degree + 1)
-    for i in range(n):
-        if slots[i] == 0:
+    for i in range(g.shape[1]):
+        if slots.number[i] == 0:
             for row in range(g.shape[0]):
                 out[row, i] = ZERO
             continue
         sums[:] = ZERO
-        for slot in range(first_slot[i], first_slot[i] + slots[i]):
+        for slot in range(slots.first[i], slots.first[i] + slots.number[i]):
             for column in range(9):
                 sums[column] += pair_gradient[slot, column]
         # Forward again, to where the ellipse is.
@@ -118,8 +147,9 @@ def project_backward(g, n, cam, degree, low_pass, antialias, first_slot, slots, 
 
 
 @compiled
-def regularise(g, n, out, opacity_weight, scale_weight):
+def regularise(g, opacity_weight, scale_weight, out):
     """Adds the gradients of opacity_weight · Σ opacity + scale_weight · Σ scale (Kheradmand et al. 2024, Eq. 10)."""
+    n = g.shape[1]
     for i in range(n):
         opacity = sigmoid(g[LOGIT, i])
         out[LOGIT, i] += opacity_weight * opacity * (ONE - opacity)
@@ -129,19 +159,16 @@ def regularise(g, n, out, opacity_weight, scale_weight):
 
 
 @compiled
-def adam(parameters, gradient, first, second, n, rates, correction_1, correction_2):
-    """One step of Adam (Kingma and Ba 2015), β = (0.9, 0.999), ε = 1e-15 as 3DGS; one rate per row.
-
-    correction_1 and correction_2 are 1 / (1 - βᵗ).
-    """
+def adam(parameters, gradient, moments, rates):
+    """One step of Adam (Kingma and Ba 2015), β = (0.9, 0.999), ε = 1e-15 as 3DGS; one rate per row."""
     b1, b2, eps = F(0.9), F(0.999), F(1e-15)
     for row in range(parameters.shape[0]):
-        p, g, m, v = parameters[row], gradient[row], first[row], second[row]
-        rate = rates[row] * correction_1
+        p, g, m, v = parameters[row], gradient[row], moments.first[row], moments.second[row]
+        rate = rates.rows[row] * rates.correction_1
         if rate == ZERO:
             continue
-        for i in range(n):
+        for i in range(parameters.shape[1]):
             mean = b1 * m[i] + (ONE - b1) * g[i]
             square = b2 * v[i] + (ONE - b2) * g[i] * g[i]
             m[i], v[i] = mean, square
-            p[i] -= rate * mean / (np.sqrt(square * correction_2) + eps)
+            p[i] -= rate * mean / (np.sqrt(square * rates.correction_2) + eps)

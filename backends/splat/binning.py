@@ -7,10 +7,12 @@ every run.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from .kernels import HALF, ONE, ZERO, F, compiled
+from ...common.kernels import compiled
+from .kernels import HALF, ONE, ZERO, F
 from .projection import (
     CONIC_A,
     CONIC_B,
@@ -25,17 +27,62 @@ from .projection import (
 TILE = 8  # pixels; 64 of them are a few vectors, and small tiles waste little on small splats
 
 
+class Order(NamedTuple):
+    """Visible splats in order of depth, and what sorting them takes."""
+
+    indices: np.ndarray  # (N,) int64, the first of them used, nearest first
+    keys: np.ndarray  # (N,) uint32, log depth in 22 bits
+    scratch: np.ndarray  # (N,) int64, indices half sorted
+    scratch_keys: np.ndarray  # (N,) uint32
+
+    @classmethod
+    def zeros(cls, capacity: int) -> "Order":
+        """Room for so many Gaussians."""
+        return cls(*(np.zeros(capacity, kind) for kind in (np.int64, np.uint32, np.int64, np.uint32)))
+
+
+class Slots(NamedTuple):
+    """One slot for each of the P pairs (splat, tile) that touch, grouped by splat."""
+
+    first: np.ndarray  # (N,) int64, where a splat's slots begin
+    number: np.ndarray  # (N,) int64, how many there are, 0 for splats that are not drawn
+    tile: np.ndarray  # (at least P,) int64, by slot
+    splat: np.ndarray  # (at least P,) int64, by slot
+
+    @classmethod
+    def zeros(cls, capacity: int, pairs: int) -> "Slots":
+        """Room for so many Gaussians and pairs."""
+        return cls(*(np.zeros(size, np.int64) for size in (capacity, capacity, pairs, pairs)))
+
+
+class Tiles(NamedTuple):
+    """A picture's tiles, row by row, each with the list of its slots."""
+
+    width: int  # pixels of the picture
+    height: int  # pixels
+    lists: np.ndarray  # (at least P,) int64 slots, tile after tile, nearest first
+    starts: np.ndarray  # (tiles + 1,) int64, where a tile's list begins
+    stops: np.ndarray  # (tiles,) int64, where drawing left it, since nothing behind is seen
+
+    @classmethod
+    def zeros(cls, width: int, height: int, pairs: int) -> "Tiles":
+        """Of a picture, with room for so many pairs."""
+        tiles = -(-width // TILE) * -(-height // TILE)
+        return cls(width, height, *(np.zeros(size, np.int64) for size in (pairs, tiles + 1, tiles)))
+
+
 @compiled
-def sort_visible(n, extents, order, scratch, keys, scratch_keys):
-    """Writes the indices of visible splats, nearest first, into `order`; returns their number.
+def sort_visible(n, extents, order):
+    """Writes the indices of visible splats among the first n, nearest first, into the order; returns their number.
 
     Sorts 22 bits of log depth, 11 at a time: neighbours closer than 3e-6 of the range keep their storage order.
     """
+    indices, keys, scratch, scratch_keys = order
     visible = 0
     nearest, farthest = np.inf, 0.0
     for i in range(n):
         if extents[i, CUT] > ZERO:
-            order[visible] = i
+            indices[visible] = i
             visible += 1
             nearest, farthest = min(nearest, extents[i, DEPTH]), max(farthest, extents[i, DEPTH])
     if visible == 0:
@@ -46,7 +93,7 @@ def sort_visible(n, extents, order, scratch, keys, scratch_keys):
     first, second = np.zeros(2048, np.int64), np.zeros(2048, np.int64)
     for j in range(visible):
         # Clamped: where all depths are nearly one, rounding alone would lead out of the table.
-        key = np.uint32(min(max((math.log(extents[order[j], DEPTH]) - low) * scale, 0.0), largest))
+        key = np.uint32(min(max((math.log(extents[indices[j], DEPTH]) - low) * scale, 0.0), largest))
         keys[j] = key
         first[key & 2047] += 1
         second[key >> 11] += 1
@@ -56,31 +103,31 @@ def sort_visible(n, extents, order, scratch, keys, scratch_keys):
         other, second[bucket] = other + second[bucket], other
     for j in range(visible):
         bucket = keys[j] & 2047
-        scratch[first[bucket]], scratch_keys[first[bucket]] = order[j], keys[j]
+        scratch[first[bucket]], scratch_keys[first[bucket]] = indices[j], keys[j]
         first[bucket] += 1
     for j in range(visible):
         bucket = scratch_keys[j] >> 11
-        order[second[bucket]] = scratch[j]
+        indices[second[bucket]] = scratch[j]
         second[bucket] += 1
     return visible
 
 
 @compiled
-def fill_tiles(visible, order, splats, extents, width, height, first_slot, slots, slot_tile, slot_splat, lists, starts):
-    """Fills the slots and the tiles' lists of slots; returns the number of pairs, or -1 when they do not fit.
+def fill_tiles(visible, order, splats, slots, tiles):
+    """Fills slots and tiles with the `visible` first splats of the order; returns the number of pairs.
 
-    first_slot, slots: (N,) where a splat's slots begin and how many there are, 0 for those not drawn (set by the
-    caller). slot_tile, slot_splat: (P,). lists: (P,) slots, tile after tile, nearest first; starts: (tiles + 1,).
+    It is -1 when they do not fit. The number of slots of splats that are not visible is set to 0 by the caller.
     """
+    indices, drawn, extents = order.indices, splats.drawn, splats.extents
+    width, height, lists, starts, _ = tiles
     across, down = (width + TILE - 1) // TILE, (height + TILE - 1) // TILE
-    tiles = across * down
-    counts = np.zeros(tiles + 1, np.int64)
+    counts = np.zeros(across * down + 1, np.int64)
     pairs = 0
-    capacity = slot_tile.shape[0]
+    capacity = slots.tile.shape[0]
     size, inverse_size = F(TILE), F(1 / TILE)
     for j in range(visible):
-        i = order[j]
-        x, y = splats[i, X], splats[i, Y]
+        i = indices[j]
+        x, y = drawn[i, X], drawn[i, Y]
         a, b, c = extents[i, CONIC_A], extents[i, CONIC_B], extents[i, CONIC_C]
         cut, half_height = extents[i, CUT], extents[i, HALF_HEIGHT]
         top = max(0, math.floor((y - half_height - HALF) * inverse_size))
@@ -108,17 +155,17 @@ def fill_tiles(visible, order, splats, extents, width, height, first_slot, slots
                 continue
             for column in range(max(first_pixel, 0) // TILE, min(last_pixel, width - 1) // TILE + 1):
                 tile = row * across + column
-                slot_tile[pairs], slot_splat[pairs] = tile, i
+                slots.tile[pairs], slots.splat[pairs] = tile, i
                 counts[tile] += 1
                 pairs += 1
-        first_slot[i], slots[i] = begin, pairs - begin
+        slots.first[i], slots.number[i] = begin, pairs - begin
     total = 0
-    for tile in range(tiles):
+    for tile in range(across * down):
         starts[tile] = total
         total, counts[tile] = total + counts[tile], total
-    starts[tiles] = total
+    starts[across * down] = total
     for slot in range(pairs):
-        tile = slot_tile[slot]
+        tile = slots.tile[slot]
         lists[counts[tile]] = slot
         counts[tile] += 1
     return pairs

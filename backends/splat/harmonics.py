@@ -3,7 +3,8 @@
 √2 Im Yₗ^|m| for m < 0, Yₗ⁰, √2 Re Yₗ^m for m > 0, with the Condon-Shortley phase; m from -l to l.
 """
 
-from .kernels import HALF, ONE, F, inlined
+from ...common.kernels import inlined
+from .kernels import HALF, ONE, F
 from .layout import SH0, SH_C0
 
 MOST = 16  # basis functions

@@ -1,49 +1,8 @@
-"""How every kernel of this backend is compiled, and the arithmetic that they share."""
+"""The arithmetic that the kernels share: single precision, without branches, so that loops run as vectors."""
 
-import hashlib
-import os
-from pathlib import Path
-from typing import Any
+import numpy as np
 
-from ...common.files import user_cache
-
-
-def _prepare() -> None:
-    """Settings that numba reads when it is first imported, unless the user has made them.
-
-    Compiled kernels are kept in the user's cache folder, so that all jobs of a study share them. Its name has a hash
-    of this backend's sources: numba looks at the file of a kernel alone, and would keep one that inlines what another
-    file has changed. Full-width vectors are allowed, which numba by default avoids on processors that have them (a
-    quarter of the speed).
-    """
-    if "NUMBA_CACHE_DIR" not in os.environ:
-        sources = b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
-        os.environ["NUMBA_CACHE_DIR"] = str(user_cache(f"numba-{hashlib.sha256(sources).hexdigest()[:16]}"))
-    if "NUMBA_CPU_FEATURES" not in os.environ and "NUMBA_CPU_NAME" not in os.environ:
-        try:
-            import llvmlite.binding as llvm
-
-            features = llvm.get_host_cpu_features()
-            features["prefer-256-bit"] = False
-            os.environ["NUMBA_CPU_FEATURES"] = features.flatten()
-            os.environ["NUMBA_CPU_NAME"] = llvm.get_host_cpu_name()
-        except (ImportError, RuntimeError):
-            pass
-
-
-_prepare()
-
-import numpy as np  # noqa: E402
-from numba import njit  # noqa: E402
-
-OPTIONS: Any = {
-    "fastmath": {"nsz", "arcp", "contract", "afn", "reassoc"},
-    "error_model": "numpy",
-    "boundscheck": False,
-    "nogil": True,
-}
-compiled = njit(cache=True, **OPTIONS)
-inlined = njit(inline="always", **OPTIONS)
+from ...common.kernels import inlined
 
 F = np.float32
 ZERO, HALF, ONE, TWO = F(0), F(0.5), F(1), F(2)

@@ -14,13 +14,15 @@ from .._points import knowing
 from .._surroundings import surroundings
 from .._types import Budget, Report, Trained, TrainingSet
 from . import layout, ply
-from .engine import Engine
+from .backward import Moments, Rates
 from .initial import initial
 from .options import Options, Rendering
 from .projection import camera_vectors
 from .relocate import relocate
+from .renderer import Renderer
 from .snapshot import State
 from .stages import Stage, halved
+from .trainer import Weights
 
 CURVE_POINTS = 10
 ROUND = 100  # steps that the loss of a point of the curve is averaged over, at most
@@ -47,33 +49,25 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
     full = Stage(data.images, data.cameras, gaussians.shape[1], rendering)
     coarse = halved(data, gaussians.shape[1], rendering) if o.coarse else None
     first_rates, last = _rates(o, around.extent)
-    weights = o.opacity_weight / gaussians.shape[1], o.scale_weight / gaussians.shape[1]
+    weights = Weights(o.ssim, o.opacity_weight / gaussians.shape[1], o.scale_weight / gaussians.shape[1])
     # A step on copies loads the kernels, which is set-up and not training.
-    moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
-    full.engine.step(gaussians.copy(), moments, full.cameras[0], full.targets[0], first_rates, 1, o.ssim, 1e-9, 1e-9)
+    moments, rates = Moments.zeros(gaussians), Rates.of_step(1, first_rates)
+    full.trainer.step(gaussians.copy(), moments, full.cameras[0], full.targets[0], rates, Weights(o.ssim, 1e-9, 1e-9))
     setup = time.perf_counter() - entered
-    state = State.load(out) or State(gaussians, np.zeros_like(gaussians), np.zeros_like(gaussians), rng)
+    state = State.load(out) or State(gaussians, Moments.zeros(gaussians), rng)
     saved = began = time.perf_counter() - state.seconds
     while (share := _share(state.step, state.seconds, budget)) < 1:
         if not state.order:
             state.order = state.rng.permutation(views).tolist()
         view = state.order.pop()
         state.step += 1
-        rates = (first_rates * last**share).astype(np.float32)
+        rates = Rates.of_step(state.step, first_rates * last**share)
         stage = coarse if coarse and share < o.coarse else full
-        loss = stage.engine.step(
-            state.gaussians,
-            (state.first, state.second),
-            stage.cameras[view],
-            stage.targets[view],
-            rates,
-            state.step,
-            o.ssim,
-            *weights,
-        )
+        camera, target = stage.cameras[view], stage.targets[view]
+        loss = stage.trainer.step(state.gaussians, state.moments, camera, target, rates, weights)
         state.losses = [*state.losses[1 - min(views, ROUND) :], loss] if views > 1 else [loss]
         if state.step % o.relocate_every == 0 and share < o.relocate_until:
-            state.relocated += relocate(state.gaussians, (state.first, state.second), state.rng)
+            state.relocated += relocate(state.gaussians, state.moments, state.rng)
         if state.step % CHECK_EVERY and state.step != budget.iterations:
             continue
         state.seconds = time.perf_counter() - began
@@ -130,12 +124,12 @@ def _finite(gaussians: np.ndarray) -> np.ndarray:
 def draw(gaussians: np.ndarray, cameras: Cameras, rendering: Rendering) -> Iterator[np.ndarray]:
     """Pictures (H, W, 3) in [0, 1] of the cameras, one after another; the degree is that of the Gaussians."""
     rendering = dataclasses.replace(rendering, degree=layout.degree_of(gaussians))
-    engine: Engine | None = None
+    renderer: Renderer | None = None
     for vector, camera in zip(camera_vectors(cameras), cameras, strict=True):
         size = int(camera.width[0]), int(camera.height[0])
-        if engine is None or (engine.width, engine.height) != size:
-            engine = Engine(gaussians.shape[1], *size, rendering)
-        picture = engine.draw(gaussians, vector)
+        if renderer is None or (renderer.width, renderer.height) != size:
+            renderer = Renderer(gaussians.shape[1], *size, rendering)
+        picture = renderer.draw(gaussians, vector)
         yield np.ascontiguousarray(np.clip(picture, 0, 1).transpose(1, 2, 0))
 
 

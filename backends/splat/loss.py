@@ -6,11 +6,14 @@ With µ, E = blur(x²) and F = blur(xy), SSIM = A₁A₂ / (B₁B₂), A₁ = 2�
 B₁ = µ² + µ_y² + C₁, B₂ = E - µ² + var_y + C₂, and ∂/∂x = blur(∂/∂µ) + 2x blur(∂/∂E) + y blur(∂/∂F).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from .kernels import ONE, TWO, ZERO, F, compiled
+from ...common.kernels import compiled
+from .kernels import ONE, TWO, ZERO, F
+from .planes import RADIUS, Planes
 
-RADIUS = 5
 C1, C2 = F(1e-4), F(9e-4)
 _window = np.exp(-(np.arange(-RADIUS, RADIUS + 1) ** 2) / (2 * 1.5**2))
 WINDOW = _window / _window.sum()
@@ -19,43 +22,54 @@ W0, W1, W2, W3, W4, W5 = (F(WINDOW[RADIUS + offset]) for offset in range(6))
 U1, U2, U3, U4, U5, U6, U7, U8, U9, U10 = (np.uint64(offset) for offset in range(1, 11))
 
 
-class Planes:
-    """Sizes of the padded planes, and the loss's working memory."""
+class Target(NamedTuple):
+    """A training picture in padded planes, with the part of its SSIM that the drawn picture does not change."""
 
-    def __init__(self, width: int, height: int):
-        self.width, self.height = width, height
-        self.stride = -(-(width + 2 * RADIUS) // 16) * 16
-        self.rows = height + 2 * RADIUS
-        self.size = self.rows * self.stride
-        self.mask = np.zeros(self.size, np.float32)
-        self.view(self.mask)[:] = 1
-        self.work = np.zeros((8, self.size), np.float32)
+    image: np.ndarray  # (3, size) float32
+    mean: np.ndarray  # (3, size) float32, µ_y
+    variance: np.ndarray  # (3, size) float32, var_y
 
-    def new(self, channels: int = 3) -> np.ndarray:
-        """(channels, size) of zeros."""
-        return np.zeros((channels, self.size), np.float32)
-
-    def view(self, planes: np.ndarray) -> np.ndarray:
-        """The picture inside padded planes, (…, H, W), not a copy."""
-        shaped = planes.reshape(*planes.shape[:-1], self.rows, self.stride)
-        return shaped[..., RADIUS : RADIUS + self.height, RADIUS : RADIUS + self.width]
-
-    def target(self, image: np.ndarray) -> np.ndarray:
-        """(3, 3, size): a training image (H, W, 3), its local mean and its local variance, in padded planes."""
+    @classmethod
+    def of(cls, image: np.ndarray, planes: Planes) -> "Target":
+        """Of an image (H, W, 3)."""
         from scipy.ndimage import convolve1d
 
         def blur(plane: np.ndarray) -> np.ndarray:
             first = convolve1d(plane, WINDOW, axis=0, mode="constant")
             return convolve1d(first, WINDOW, axis=1, mode="constant")
 
-        planes = np.zeros((3, 3, self.size), np.float32)
+        made = cls(planes.zeros(3), planes.zeros(3), planes.zeros(3))
         for channel in range(3):
             values = image[..., channel].astype(np.float64)
             mean = blur(values)
-            self.view(planes[0, channel])[:] = values
-            self.view(planes[1, channel])[:] = mean
-            self.view(planes[2, channel])[:] = blur(values * values) - mean * mean
-        return planes
+            planes.inside(made.image[channel])[:] = values
+            planes.inside(made.mean[channel])[:] = mean
+            planes.inside(made.variance[channel])[:] = blur(values * values) - mean * mean
+        return made
+
+
+class Local(NamedTuple):
+    """What SSIM takes of the window around each pixel of one channel, or the derivatives by it."""
+
+    mean: np.ndarray  # (size,) float32, µ
+    square: np.ndarray  # (size,) float32, E
+    product: np.ndarray  # (size,) float32, F
+
+
+class Workspace(NamedTuple):
+    """What the loss of pictures of one size works in."""
+
+    planes: np.ndarray  # (8, size) float32
+    mask: np.ndarray  # (size,) float32, 1 inside the picture and 0 around it
+    stride: int  # from one row of a plane to the next
+    pixels: int  # of the picture, padding not counted
+
+    @classmethod
+    def of(cls, planes: Planes) -> "Workspace":
+        """For pictures in these planes."""
+        mask = planes.zeros(1)[0]
+        planes.inside(mask)[:] = 1
+        return cls(planes.zeros(8), mask, planes.stride, planes.width * planes.height)
 
 
 @compiled
@@ -94,14 +108,14 @@ def _multiply(a, b, out, n):
 
 
 @compiled
-def _ssim(mean, square, product, mean_y, var_y, mask, d_mean, d_square, d_product, scale, n):
+def _ssim(x, mean_y, var_y, mask, scale, by):
     """Sum of SSIM over the picture; writes `scale` times its derivatives by µ, E and F."""
     total = ZERO
-    for i in range(n):
-        m, my, inside = mean[i], mean_y[i], mask[i]
-        a1, a2 = TWO * m * my + C1, TWO * (product[i] - m * my) + C2
+    for i in range(mask.shape[0]):
+        m, my, inside = x.mean[i], mean_y[i], mask[i]
+        a1, a2 = TWO * m * my + C1, TWO * (x.product[i] - m * my) + C2
         b1 = ONE / (m * m + my * my + C1)
-        b2 = ONE / (square[i] - m * m + var_y[i] + C2)
+        b2 = ONE / (x.square[i] - m * m + var_y[i] + C2)
         both = b1 * b2
         value = a1 * a2 * both
         total += value * inside
@@ -109,32 +123,33 @@ def _ssim(mean, square, product, mean_y, var_y, mask, d_mean, d_square, d_produc
         by_square = -value * b2
         by_mean = TWO * my * a2 * both - TWO * m * value * b1 - my * by_product - TWO * m * by_square
         factor = scale * inside
-        d_mean[i], d_square[i], d_product[i] = factor * by_mean, factor * TWO * by_square, factor * by_product
+        by.mean[i], by.square[i], by.product[i] = factor * by_mean, factor * TWO * by_square, factor * by_product
     return total
 
 
 @compiled
-def _gradient(x, y, by_mean, by_square, by_product, out, step, n):
+def _gradient(x, y, by, step, out):
     """Writes the gradient of the whole loss; returns the sum of |x - y|."""
     total = ZERO
-    for i in range(n):
+    for i in range(out.shape[0]):
         difference = x[i] - y[i]
         total += abs(difference)
         sign = step if difference > ZERO else (-step if difference < ZERO else ZERO)
-        out[i] = by_mean[i] + x[i] * by_square[i] + y[i] * by_product[i] + sign
+        out[i] = by.mean[i] + x[i] * by.square[i] + y[i] * by.product[i] + sign
     return total
 
 
 @compiled
-def loss(image, target, mask, work, gradient, stride, weight, pixels):
-    """The loss, a float; fills `gradient`. All planes are padded: image, gradient (3, size), target (3, 3, size)."""
+def loss(image, target, weight, workspace, gradient):
+    """The loss of image (3, size), a float; fills gradient (3, size). Both are padded planes; `weight` is λ."""
+    work, mask, stride, pixels = workspace
     n = image.shape[1]
     flat, tall = n - 2 * RADIUS, n - 2 * RADIUS * stride
     inverse = ONE / F(3 * pixels)
     step = (ONE - weight) * inverse
     total = 0.0
     for c in range(3):
-        x, y = image[c], target[0, c]
+        x, y = image[c], target.image[c]
         _multiply(x, x, work[0], n)
         _multiply(x, y, work[1], n)
         _blur_rows(x, work[2], flat)
@@ -143,25 +158,15 @@ def loss(image, target, mask, work, gradient, stride, weight, pixels):
         _blur_columns(work[2], work[5], tall, stride)
         _blur_columns(work[3], work[6], tall, stride)
         _blur_columns(work[4], work[7], tall, stride)
-        similarity = _ssim(
-            work[5],
-            work[6],
-            work[7],
-            target[1, c],
-            target[2, c],
-            mask,
-            work[0],
-            work[1],
-            work[2],
-            -weight * inverse,
-            n,
-        )
+        by = Local(work[0], work[1], work[2])
+        local = Local(work[5], work[6], work[7])
+        similarity = _ssim(local, target.mean[c], target.variance[c], mask, -weight * inverse, by)
         _blur_rows(work[0], work[3], flat)
         _blur_rows(work[1], work[4], flat)
         _blur_rows(work[2], work[5], flat)
         _blur_columns(work[3], work[0], tall, stride)
         _blur_columns(work[4], work[1], tall, stride)
         _blur_columns(work[5], work[2], tall, stride)
-        absolute = _gradient(x, y, work[0], work[1], work[2], gradient[c], step, n)
+        absolute = _gradient(x, y, by, step, gradient[c])
         total += weight * inverse * (F(pixels) - similarity) + step * absolute
     return total

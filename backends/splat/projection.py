@@ -13,11 +13,14 @@ The colour is ½ plus the spherical harmonics in the direction from the camera, 
 gradient to the mean, which is what 3DGS's own kernels leave in and what makes no measurable difference here.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
+from ...common.kernels import compiled, inlined
 from ...scenes.types import OPENCV, Cameras
 from .harmonics import MOST, colour, fill_basis
-from .kernels import HALF, LOG2E, ONE, TWO, ZERO, F, compiled, exp, inlined, sigmoid
+from .kernels import HALF, LOG2E, ONE, TWO, ZERO, F, exp, sigmoid
 from .layout import LOG_SCALE, LOGIT, MEAN, QUATERNION
 
 FAINTEST = F(2.5e-5)  # of the squared factor that `antialias` multiplies opacities by
@@ -27,13 +30,35 @@ MIN_ALPHA_LOG2 = F(7.994353436858858)  # -log2(1/255): below it a splat is not d
 # A camera as kernels take it: 21 float32.
 ROTATION, TRANSLATION, FX, FY, CX, CY, POSITION, WIDTH, HEIGHT = 0, 9, 12, 13, 14, 15, 16, 19, 20
 
-# Columns of `splats`, what the rasteriser reads of each Gaussian. With d = pixel - mean, log2 of alpha is
+# Columns of `Splats.drawn`. With d = pixel - mean, log2 of alpha is
 # L - (A dx² + B dx dy + C dy²): the conic with ½ and log2 e folded in.
 X, Y, A, B, C, LOG2_OPACITY, RED, GREEN, BLUE = range(9)
 SPLAT_COLUMNS = 16  # padded to a cache line
-# Columns of `extents`, what binning reads: conic, squared radius at which alpha is 1/255, half box, depth.
+# Columns of `Splats.extents`: conic, squared radius at which alpha is 1/255, half box, depth.
 CONIC_A, CONIC_B, CONIC_C, CUT, HALF_WIDTH, HALF_HEIGHT, DEPTH = range(7)
 EXTENT_COLUMNS = 8
+
+
+class View(NamedTuple):
+    """A camera and how it sees Gaussians."""
+
+    camera: np.ndarray  # (21,) float32, one of `camera_vectors`
+    degree: int  # of spherical harmonics
+    near: np.float32  # near plane, scene units
+    low_pass: np.float32  # pixels², variance of the filter on the screen
+    antialias: bool  # the filter keeps a splat's light
+
+
+class Splats(NamedTuple):
+    """Gaussians on the screen."""
+
+    drawn: np.ndarray  # (N, SPLAT_COLUMNS) float32, what the rasteriser reads
+    extents: np.ndarray  # (N, EXTENT_COLUMNS) float32, what binning reads; CUT < 0 where nothing is seen
+
+    @classmethod
+    def zeros(cls, capacity: int) -> "Splats":
+        """Room for so many Gaussians."""
+        return cls(*(np.zeros((capacity, columns), np.float32) for columns in (SPLAT_COLUMNS, EXTENT_COLUMNS)))
 
 
 def camera_vectors(cameras: Cameras) -> np.ndarray:
@@ -111,12 +136,14 @@ def view_direction(g, cam, i):
 
 
 @compiled
-def project(g, n, cam, degree, near, low_pass, antialias, splats, extents):
-    """Fills `splats` and `extents` for the first n Gaussians; what is not on the screen gets CUT < 0."""
+def project(g, view, splats):
+    """Fills the splats of Gaussians g (rows, N); what is not on the screen gets CUT < 0."""
+    cam, degree, near, low_pass, antialias = view
+    drawn, extents = splats
     fx, fy, cx, cy, width, height = cam[FX], cam[FY], cam[CX], cam[CY], cam[WIDTH], cam[HEIGHT]
     limit_x, limit_y = HALF * MARGIN * width / fx, HALF * MARGIN * height / fy
     basis, count = np.empty(MOST, np.float32), (degree + 1) * (degree + 1)
-    for i in range(n):
+    for i in range(g.shape[1]):
         extents[i, CUT] = F(-1)
         tx, ty, tz = to_camera(g, cam, i)
         if not tz > near:
@@ -159,8 +186,8 @@ def project(g, n, cam, degree, near, low_pass, antialias, splats, extents):
         extents[i, DEPTH] = tz
         dx, dy, dz = view_direction(g, cam, i)
         fill_basis(degree, dx, dy, dz, basis)
-        splats[i, X], splats[i, Y] = px, py
-        splats[i, A], splats[i, B], splats[i, C] = conic_a * (HALF * LOG2E), conic_b * LOG2E, conic_c * (HALF * LOG2E)
-        splats[i, LOG2_OPACITY] = log2_opacity
+        drawn[i, X], drawn[i, Y] = px, py
+        drawn[i, A], drawn[i, B], drawn[i, C] = conic_a * (HALF * LOG2E), conic_b * LOG2E, conic_c * (HALF * LOG2E)
+        drawn[i, LOG2_OPACITY] = log2_opacity
         for channel in range(3):
-            splats[i, RED + channel] = max(colour(g, i, channel, count, basis), ZERO)
+            drawn[i, RED + channel] = max(colour(g, i, channel, count, basis), ZERO)

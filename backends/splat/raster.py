@@ -9,8 +9,9 @@ from the forward pass, so the part of it that lies behind splat i is found by su
 
 import numpy as np
 
+from ...common.kernels import compiled
 from .binning import TILE
-from .kernels import HALF, ONE, ZERO, F, compiled, exp2_8
+from .kernels import HALF, ONE, ZERO, F, exp2_8
 from .projection import BLUE, GREEN, LOG2_OPACITY, MIN_ALPHA_LOG2, RED, A, B, C, X, Y
 
 PIXELS = TILE * TILE
@@ -25,8 +26,9 @@ PAIR_COLUMNS = 12
 
 
 @compiled
-def render(width, height, splats, slot_splat, lists, starts, stops, background, image):
-    """Draws into image (3, H, W); stops[tile] is where its list was left, for the backward pass."""
+def render(drawn, slots, tiles, background, image):
+    """Draws splats (N, SPLAT_COLUMNS) on the background (3,) into image (3, H, W); sets where tiles' lists stop."""
+    width, height, lists, starts, stops = tiles
     across, down = (width + TILE - 1) // TILE, (height + TILE - 1) // TILE
     m = np.empty(6 * PIXELS, np.float32)
     for tile in range(across * down):
@@ -41,11 +43,11 @@ def render(width, height, splats, slot_splat, lists, starts, stops, background, 
         begin, end = starts[tile], starts[tile + 1]
         k = begin
         while k < end:
-            i = slot_splat[lists[k]]
+            i = slots.splat[lists[k]]
             k += 1
-            x, y, a, b, c = splats[i, X], splats[i, Y], splats[i, A], splats[i, B], splats[i, C]
-            opacity = splats[i, LOG2_OPACITY]
-            red, green, blue = splats[i, RED], splats[i, GREEN], splats[i, BLUE]
+            x, y, a, b, c = drawn[i, X], drawn[i, Y], drawn[i, A], drawn[i, B], drawn[i, C]
+            opacity = drawn[i, LOG2_OPACITY]
+            red, green, blue = drawn[i, RED], drawn[i, GREEN], drawn[i, BLUE]
             for p in range(np.uint64(PIXELS)):
                 dx, dy = m[PX + p] - x, m[PY + p] - y
                 e = opacity - (a * dx * dx + dy * (b * dx + c * dy))
@@ -73,8 +75,9 @@ def render(width, height, splats, slot_splat, lists, starts, stops, background, 
 
 
 @compiled
-def render_backward(width, height, splats, slot_splat, lists, starts, stops, image, image_gradient, pair_gradient):
-    """Fills pair_gradient (P, PAIR_COLUMNS) from the image (3, H, W) and its gradient."""
+def render_backward(drawn, slots, tiles, image, image_gradient, pair_gradient):
+    """Fills pair_gradient (P, PAIR_COLUMNS), by slot, from the image (3, H, W) and its gradient."""
+    width, height, lists, starts, stops = tiles
     across, down = (width + TILE - 1) // TILE, (height + TILE - 1) // TILE
     m = np.empty(7 * PIXELS, np.float32)
     for tile in range(across * down):
@@ -95,10 +98,10 @@ def render_backward(width, height, splats, slot_splat, lists, starts, stops, ima
                 m[6 * PIXELS + p] = r * image[0, y_, x_] + g * image[1, y_, x_] + b_ * image[2, y_, x_]
         for k in range(starts[tile], stops[tile]):
             slot = lists[k]
-            i = slot_splat[slot]
-            x, y, a, b, c = splats[i, X], splats[i, Y], splats[i, A], splats[i, B], splats[i, C]
-            opacity = splats[i, LOG2_OPACITY]
-            red, green, blue = splats[i, RED], splats[i, GREEN], splats[i, BLUE]
+            i = slots.splat[slot]
+            x, y, a, b, c = drawn[i, X], drawn[i, Y], drawn[i, A], drawn[i, B], drawn[i, C]
+            opacity = drawn[i, LOG2_OPACITY]
+            red, green, blue = drawn[i, RED], drawn[i, GREEN], drawn[i, BLUE]
             s_0 = s_x = s_y = s_xx = s_xy = s_yy = w_r = w_g = w_b = ZERO
             for p in range(np.uint64(PIXELS)):
                 dx, dy = m[PX + p] - x, m[PY + p] - y

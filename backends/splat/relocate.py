@@ -4,15 +4,14 @@ import math
 
 import numpy as np
 
+from .backward import Moments
 from .layout import LOG_SCALE, LOGIT
 
 DEAD = 0.005  # opacity
 MOST = 20  # copies of one Gaussian at a time
 
 
-def relocate(
-    gaussians: np.ndarray, moments: tuple[np.ndarray, np.ndarray], rng: np.random.Generator, dead_below: float = DEAD
-) -> int:
+def relocate(gaussians: np.ndarray, moments: Moments, rng: np.random.Generator, dead_below: float = DEAD) -> int:
     """Replaces dead Gaussians by copies of living ones, drawn by opacity, so that the picture hardly changes.
 
     A Gaussian that becomes n gets opacity o' = 1 - (1 - o)^(1/n), and scales shrunk by o / Σᵢ Σₖ of the paper's

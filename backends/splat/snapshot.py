@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...common.files import whole
+from .backward import Moments
 
 FILE = "snapshot.npz"
 
@@ -17,8 +18,7 @@ class State:
     """Everything that a step changes."""
 
     gaussians: np.ndarray  # (rows, N) float32
-    first: np.ndarray  # (rows, N) float32, Adam's mean of gradients
-    second: np.ndarray  # (rows, N) float32, Adam's mean of squared gradients
+    moments: Moments
     rng: np.random.Generator
     step: int = 0
     seconds: float = 0.0
@@ -32,7 +32,7 @@ class State:
         plain = {name: getattr(self, name) for name in ("step", "seconds", "relocated", "order", "losses", "curve")}
         plain["rng"] = self.rng.bit_generator.state
         with whole(folder / FILE) as temporary, open(temporary, "wb") as file:
-            np.savez(file, gaussians=self.gaussians, first=self.first, second=self.second, plain=json.dumps(plain))
+            np.savez(file, gaussians=self.gaussians, **self.moments._asdict(), plain=json.dumps(plain))
 
     @staticmethod
     def load(folder: Path) -> "State | None":
@@ -42,7 +42,7 @@ class State:
                 plain = json.loads(str(stored["plain"]))
                 rng = np.random.default_rng()
                 rng.bit_generator.state = plain.pop("rng")
-                return State(stored["gaussians"], stored["first"], stored["second"], rng, **plain)
+                return State(stored["gaussians"], Moments(stored["first"], stored["second"]), rng, **plain)
         except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
             return None
 

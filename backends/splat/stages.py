@@ -11,20 +11,20 @@ import numpy as np
 from ...scenes.types import Cameras
 from .._shrink import cameras_shrunk, images_shrunk
 from .._types import TrainingSet
-from .engine import Engine
 from .options import Rendering
 from .projection import camera_vectors
+from .trainer import Trainer
 
 SMALLEST = 80  # pixels: geometric mean of the sides that halved pictures must have
 
 
 class Stage:
-    """Training views of one size, K pictures (K, H, W, 3), as the engine takes them."""
+    """Training views of one size, K pictures (K, H, W, 3), as the trainer takes them."""
 
     def __init__(self, images: np.ndarray, cameras: Cameras, count: int, rendering: Rendering):
-        self.engine = Engine(count, images.shape[2], images.shape[1], rendering)
+        self.trainer = Trainer(count, images.shape[2], images.shape[1], rendering)
         self.cameras = camera_vectors(cameras)
-        self.targets = [self.engine.planes.target(image) for image in images]
+        self.targets = [self.trainer.target(image) for image in images]
 
 
 def halved(data: TrainingSet, count: int, rendering: Rendering) -> Stage | None:

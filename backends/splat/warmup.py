@@ -5,9 +5,10 @@ import numpy as np
 from ...scenes.types import Cameras
 from .._points.plane_sweep import sweep
 from . import layout
-from .engine import Engine
+from .backward import Moments, Rates
 from .options import Rendering
 from .projection import camera_vectors
+from .trainer import Trainer, Weights
 
 
 def compile_kernels() -> None:
@@ -15,13 +16,12 @@ def compile_kernels() -> None:
     one = np.ones(1)
     size = np.full(1, 16, np.int64)
     cameras = Cameras(np.eye(4)[None], 16 * one, 16 * one, 8 * one, 8 * one, size, size)
-    engine = Engine(4, 16, 16, Rendering())
+    trainer = Trainer(4, 16, 16, Rendering())
     gaussians = layout.empty(4, 1)
     gaussians[layout.MEAN + 2] = -2
     gaussians[layout.LOGIT] = 1
-    target = engine.planes.target(np.zeros((16, 16, 3), np.float32))
-    rates = np.full(len(gaussians), 1e-3, np.float32)
-    moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
-    engine.step(gaussians, moments, camera_vectors(cameras)[0], target, rates, 1, 0.2, 1e-3, 1e-3)
+    target = trainer.target(np.zeros((16, 16, 3), np.float32))
+    rates, weights = Rates.of_step(1, np.full(len(gaussians), 1e-3)), Weights(0.2, 1e-3, 1e-3)
+    trainer.step(gaussians, Moments.zeros(gaussians), camera_vectors(cameras)[0], target, rates, weights)
     picture = np.zeros((8, 8), np.float32)
     sweep(picture, picture[None], np.zeros((1, 3, 4)), np.ones(1), picture.copy(), picture.copy())

@@ -131,20 +131,23 @@ def test_a_folder_is_hashed_file_by_file(tmp_path):
 def test_more_gaussians_than_room_are_an_error_and_no_crash(small_room):
     import numpy as np
 
-    from viewbench.backends.splat.engine import Engine
+    from viewbench.backends.splat.backward import Moments, Rates
     from viewbench.backends.splat.layout import empty
     from viewbench.backends.splat.options import Rendering
     from viewbench.backends.splat.projection import camera_vectors
+    from viewbench.backends.splat.trainer import Trainer, Weights
 
     camera = camera_vectors(open_scene(str(small_room), SETTINGS).train.cameras[:1].scaled(48))[0]
-    engine = Engine(10, 48, 48, Rendering())
-    engine.draw(empty(10, 1), camera)
+    trainer = Trainer(10, 48, 48, Rendering())
+    renderer = trainer.renderer
+    renderer.draw(empty(10, 1), camera)
     with pytest.raises(ValueError, match="11 Gaussians, made for at most 10"):
-        engine.draw(empty(11, 1), camera)
+        renderer.draw(empty(11, 1), camera)
     with pytest.raises(ValueError, match="was not drawn of these 50000"):
-        engine.differentiate(empty(50_000, 1), camera)
-    moments = np.zeros_like(empty(11, 1)), np.zeros_like(empty(11, 1))
+        trainer.differentiate(empty(50_000, 1), camera)
+    target, rates = trainer.target(np.zeros((48, 48, 3), np.float32)), Rates.of_step(1, np.zeros(23))
     with pytest.raises(ValueError, match="made for at most 10"):
-        engine.step(empty(11, 1), moments, camera, engine.planes.new(), np.zeros(23, np.float32), 1, 0.2)
-    engine.resize(11)
-    engine.draw(empty(11, 1), camera)
+        trainer.step(empty(11, 1), Moments.zeros(empty(11, 1)), camera, target, rates, Weights(0.2))
+    renderer.resize(11)
+    renderer.draw(empty(11, 1), camera)
+    assert trainer.differentiate(empty(11, 1), camera).shape == (23, 11)

@@ -132,13 +132,13 @@ def slow_coverage(views: Views, count: int, choice: Choice) -> tuple[float, str]
 
     nodes = coverage.regions(views.positions)
     weight = coverage.bin_weights(kernels.POLAR, kernels.AZIMUTH)
-    seen, bins = np.empty(len(nodes), np.int64), np.empty(len(nodes), np.uint8)
+    seen = kernels.Seen.room(len(nodes))
     assert views.intrinsics is not None
     assert choice.gains is not None
     observed = []
     for place, rotation, camera in zip(views.positions, views.rotations, views.intrinsics, strict=True):
-        size = kernels.observe(nodes, place, rotation, camera, seen, bins)
-        observed.append((seen[:size].copy(), bins[:size].copy()))
+        size = kernels.observe(nodes, place, rotation, camera, seen)
+        observed.append((seen.regions[:size].copy(), seen.bins[:size].copy()))
     picks = [0, count // 2, count - 1]
     seconds = 0.0
     for pick in picks:

@@ -20,8 +20,9 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from viewbench.backends.splat import layout  # noqa: E402
-from viewbench.backends.splat.engine import Engine  # noqa: E402
+from viewbench.backends.splat.backward import Moments, Rates  # noqa: E402
 from viewbench.backends.splat.options import Rendering  # noqa: E402
+from viewbench.backends.splat.trainer import Trainer, Weights  # noqa: E402
 
 COUNTS, SIZES = (2_000, 10_000, 50_000, 200_000), (96, 128, 256, 512)
 
@@ -57,22 +58,21 @@ def measure(n: int, size: int, repeats: int) -> tuple[float, float, int]:
     gaussians, cam = cloud(n), camera(size)
     target = np.random.default_rng(1).uniform(0, 1, (size, size, 3)).astype(np.float32)
     rates = np.full(len(gaussians), 1e-5, np.float32)
-    engine = Engine(n, size, size, Rendering(0.05))
-    planes = engine.planes.target(target)
-    moments = np.zeros_like(gaussians), np.zeros_like(gaussians)
+    trainer = Trainer(n, size, size, Rendering(0.05))
+    planes, moments = trainer.target(target), Moments.zeros(gaussians)
     torch_step = TorchStep(gaussians, rates)
     torch_target = torch.tensor(target.transpose(2, 0, 1).copy())
     ours, theirs = [], []
     for number in range(1, repeats + 2):  # the first of each is not counted
         began = time.perf_counter()
-        loss = engine.step(gaussians, moments, cam, planes, rates, number, 0.2)
+        loss = trainer.step(gaussians, moments, cam, planes, Rates.of_step(number, rates), Weights(0.2))
         middle = time.perf_counter()
         other = torch_step(cam, torch_target)
         ours.append(middle - began)
         theirs.append(time.perf_counter() - middle)
         if number == 1 and abs(loss - other) > 2e-3:
             raise SystemExit(f"the two steps do not agree: loss {loss} and {other}")
-    return float(np.median(ours[1:])), float(np.median(theirs[1:])), engine.pairs
+    return float(np.median(ours[1:])), float(np.median(theirs[1:])), trainer.renderer.pairs
 
 
 def cold_start() -> tuple[float, float]:
@@ -92,10 +92,9 @@ def peak_memory(n: int, size: int) -> float:
     code = f"""
 import sys; sys.path.insert(0, {str(Path(__file__).resolve().parent)!r})
 import numpy as np, bench_splat as b
-from viewbench.backends.splat.engine import Engine
-g = b.cloud({n}); e = Engine({n}, {size}, {size}, b.Rendering(0.05)); m = np.zeros_like(g), np.zeros_like(g)
-t = e.planes.target(np.zeros(({size}, {size}, 3), np.float32)); r = np.full(len(g), 1e-5, np.float32)
-for k in range(1, 4): e.step(g, m, b.camera({size}), t, r, k, 0.2)
+g = b.cloud({n}); t = b.Trainer({n}, {size}, {size}, b.Rendering(0.05)); m = b.Moments.zeros(g)
+p = t.target(np.zeros(({size}, {size}, 3), np.float32)); r = np.full(len(g), 1e-5, np.float32)
+for k in range(1, 4): t.step(g, m, b.camera({size}), p, b.Rates.of_step(k, r), b.Weights(0.2))
 print(next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")))
 """
     # Not getrusage: what it says of a new process includes that of the process that started it.

@@ -27,3 +27,10 @@ def test_constants_are_read_without_importing():
         module = plugins.load("selectors", name)
         for variable in ("SEEDED", "FACTORS", "PARAMETERS"):
             assert plugins.constant("selectors", name, variable) == getattr(module, variable)
+
+
+def test_functions_are_found_without_importing():
+    found = {name: plugins.defines("selectors", name, "warm") for name in plugins.names("selectors")}
+    assert found == {name: hasattr(plugins.load("selectors", name), "warm") for name in found}
+    assert [name for name in found if found[name]] == ["coverage"]
+    assert not plugins.defines("selectors", "nothing", "warm")

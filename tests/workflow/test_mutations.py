@@ -138,6 +138,7 @@ def weights(clone):
 
 
 OURS = {"warm": 1, "train": 2, "evaluate": 2, **TABLES}  # the cells of one backend
+OF_ANOTHER = {"study": 1, "select": 1, "train": 3, "evaluate": 3, **TABLES}
 OF_MAXMIN = {"select": 1, "train": 3, "evaluate": 3, **TABLES}
 MUTATIONS = {
     # nothing that a number depends on
@@ -175,6 +176,12 @@ MUTATIONS = {
         study("maxmin]", "{name: maxmin, selector: maxmin, parameters: {sigma: 0.4}}]"),
         {"study": 1, **OF_MAXMIN},
     ),
+    "a selector more": (study("maxmin]", "maxmin, kcenter]"), OF_ANOTHER),
+    "a selector more that compiles": (study("maxmin]", "maxmin, coverage]"), {"warm_selector": 1, **OF_ANOTHER}),
+    "two ways of choosing by one that compiles": (
+        study("maxmin]", "maxmin, coverage, {name: coarse, selector: coverage, parameters: {spacing: 1}}]"),
+        {"warm_selector": 1, **OF_ANOTHER, "select": 2, "train": 6, "evaluate": 6},
+    ),
     # the source code
     "a selector": (source("selectors/maxmin.py"), OF_MAXMIN),
     "another selector": (source("selectors/uniform.py"), OF_MAXMIN),
@@ -183,6 +190,7 @@ MUTATIONS = {
     "the reader": (source("scenes/formats/transforms.py"), EVERYTHING),
     "the reader of another format": (source("scenes/formats/tum_rgbd.py"), {}),
     "our trainer, which draws for one program": (source("backends/splat/raster.py"), {**OURS, "evaluate": 4}),
+    "how kernels are compiled": (source("common/kernels.py"), {**OURS, "evaluate": 4}),
     "a trainer of no cell, which may draw": (source("backends/gsplat/renderer.py"), {"evaluate": 2, **TABLES}),
     "what draws a PLY": (source("backends/_ply_render.py"), {"evaluate": 2, **TABLES}),
     "what runs programs": (source("backends/_process.py"), {"warm": 2, "train": 4, "evaluate": 4, **TABLES}),
@@ -213,3 +221,11 @@ def test_one_choice_serves_every_backend_and_every_ratio_of_its_tier(clone):
     greedy = [f"walk/maxmin/{tier}/0.json" for tier in ("0.25", "0.5")]
     assert kept == sorted([*greedy, *(f"walk/uniform/{ratio}/0.json" for ratio in ("0.1", "0.2", "0.3"))])
     assert clone.planned() == {}
+
+
+def test_one_job_compiles_a_selector_before_it_chooses(clone):
+    study("maxmin]", "maxmin, coverage]")(clone)
+    clone.run()
+    assert clone.planned() == {}
+    source("selectors/_coverage_kernels.py")(clone)
+    assert clone.planned() == {"warm_selector": 1, "select": 1, "train": 3, "evaluate": 3, **TABLES}

@@ -1,15 +1,23 @@
-"""Compile a backend's kernels once, before several jobs start on them."""
+"""Compile a backend's or a selector's kernels once, before several jobs start on them."""
 
 import click
 
 
 @click.command()
-@click.option("--backend", default="splat", show_default=True, help="Trainer to prepare.")
-def command(backend: str) -> None:
-    """Compile and cache whatever BACKEND compiles; backends that compile nothing return at once."""
+@click.option("--backend", help="Trainer to prepare; splat where no selector is named either.")
+@click.option("--selector", help="Way of choosing to prepare.")
+def command(backend: str | None, selector: str | None) -> None:
+    """Compile and cache whatever BACKEND and SELECTOR compile; those that compile nothing return at once."""
     from ...backends import _registry
+    from ...common import plugins
     from ...common import settings as settings_file
 
-    warm = getattr(_registry.load(backend, settings_file.load()), "warm", None)
-    if warm is not None:
-        warm()
+    prepared = []
+    if backend or not selector:
+        prepared.append(_registry.load(backend or "splat", settings_file.load()))
+    if selector:
+        prepared.append(plugins.load("selectors", selector))
+    for plugin in prepared:
+        warm = getattr(plugin, "warm", None)
+        if warm is not None:
+            warm()

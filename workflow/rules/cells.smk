@@ -7,6 +7,7 @@ rule select:
     input:
         scene=WIRING.scene,
         features=WIRING.features,
+        warm=WIRING.warm_selector,
         depends=WIRING.choosing,
     output:
         f"{RESULTS}/selections/{{scene}}/{{selector}}/{{part}}/{{seed}}.json",

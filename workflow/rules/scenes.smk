@@ -54,7 +54,7 @@ rule features:
         "viewbench features {wildcards.scene:q} --encoder {params.encoder:q} --out {output:q} 2> {log:q}"
 
 
-# Runs again exactly when the trainings do that wait for it.
+# These two run again exactly when the trainings, and the selections, do that wait for them.
 rule warm:
     input:
         WIRING.training,
@@ -68,3 +68,16 @@ rule warm:
         "prepare backend {wildcards.backend}"
     shell:
         "viewbench warm --backend {params.backend:q} 2> {log:q}"
+
+
+rule warm_selector:
+    input:
+        WIRING.choosing_compiled,
+    output:
+        touch(f"{RESULTS}/warm_selectors/{{plugin}}"),
+    log:
+        f"{RESULTS}/logs/warm_selectors/{{plugin}}.log",
+    message:
+        "prepare selector {wildcards.plugin}"
+    shell:
+        "viewbench warm --selector {wildcards.plugin:q} 2> {log:q}"

@@ -1,5 +1,7 @@
 """Pictures, losses and gradients of the kernels against the float64 reference."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import torch
@@ -7,9 +9,11 @@ import torch
 from tests.backends.splat import reference
 from tests.conftest import known
 from viewbench.backends.splat import layout
-from viewbench.backends.splat.engine import Engine
+from viewbench.backends.splat.backward import Moments, Rates
 from viewbench.backends.splat.options import Rendering
-from viewbench.backends.splat.projection import camera_vectors
+from viewbench.backends.splat.projection import CUT, camera_vectors
+from viewbench.backends.splat.renderer import Renderer
+from viewbench.backends.splat.trainer import Trainer, Weights
 from viewbench.scenes.types import Cameras
 
 GROUPS = {"mean": (0, 3), "quaternion": (3, 7), "scale": (7, 10), "opacity": (10, 11), "sh0": (11, 14), "sh1": (14, 23)}
@@ -73,11 +77,11 @@ FILTERS = {"3dgs": {"low_pass": 0.3, "antialias": False}, "mip": {"low_pass": 0.
 def both(g, cam, how, target, weight):
     """(picture, loss, picture gradient, parameter gradient) of the kernels, and of the reference."""
     width, height = int(cam[19]), int(cam[20])
-    engine = Engine(g.shape[1], width, height, how)
-    picture = engine.draw(g, cam).copy()
-    value = engine.compare(engine.planes.target(target.transpose(1, 2, 0)), weight)
-    gradient = engine.image_gradient.copy()
-    ours = picture, value, gradient, engine.differentiate(g, cam).copy()
+    trainer = Trainer(g.shape[1], width, height, how)
+    picture = trainer.renderer.draw(g, cam).copy()
+    value = trainer.compare(trainer.target(target.transpose(1, 2, 0)), weight)
+    gradient = trainer.image_gradient.copy()
+    ours = picture, value, gradient, trainer.differentiate(g, cam).copy()
 
     parameters = torch.tensor(g.astype(np.float64), requires_grad=True)
     drawn = reference.render(parameters, cam, how)
@@ -142,9 +146,9 @@ def test_colours_of_every_degree(degree):
 
 
 def test_parameters_of_another_degree_are_refused():
-    engine = Engine(5, 16, 16, Rendering(NEAR, degree=2))
+    renderer = Renderer(5, 16, 16, Rendering(NEAR, degree=2))
     with pytest.raises(ValueError, match="23 rows"):
-        engine.draw(cloud(5, np.random.default_rng(0)), camera(16, 16, np.random.default_rng(0)))
+        renderer.draw(cloud(5, np.random.default_rng(0)), camera(16, 16, np.random.default_rng(0)))
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.2, 1.0])
@@ -152,36 +156,55 @@ def test_parameters_of_another_degree_are_refused():
 def test_loss_of_any_picture(weight, size):
     rng = np.random.default_rng(3)
     height, width = size
-    engine = Engine(1, width, height, Rendering())
+    trainer = Trainer(1, width, height, Rendering())
     picture, target = (rng.uniform(0, 1, (3, height, width)).astype(np.float32) for _ in range(2))
-    engine.image[:] = picture
-    value = engine.compare(engine.planes.target(target.transpose(1, 2, 0)), weight)
+    trainer.renderer.image[:] = picture
+    value = trainer.compare(trainer.target(target.transpose(1, 2, 0)), weight)
     x = torch.tensor(picture, dtype=torch.float64, requires_grad=True)
     wanted = reference.loss(x, torch.tensor(target, dtype=torch.float64), weight)
     wanted.backward()
     assert abs(value - wanted.item()) < 1e-5
     gradient = known(x.grad)
-    np.testing.assert_allclose(engine.image_gradient, gradient.numpy(), atol=3e-5 * float(gradient.abs().max()))
+    np.testing.assert_allclose(trainer.image_gradient, gradient.numpy(), atol=3e-5 * float(gradient.abs().max()))
 
 
 def test_an_empty_view_is_background():
     g = cloud(10, np.random.default_rng(4))
     g[layout.LOGIT] = -20
     cam = camera(20, 20, np.random.default_rng(4))
-    engine = Engine(10, 20, 20, Rendering(NEAR, 0.25))
-    assert (engine.draw(g, cam) == 0.25).all()
-    assert engine.pairs == 0
-    engine.compare(engine.planes.target(np.zeros((20, 20, 3), np.float32)), 0.2)
-    assert not engine.differentiate(g, cam).any()
+    trainer = Trainer(10, 20, 20, Rendering(NEAR, 0.25))
+    assert (trainer.renderer.draw(g, cam) == 0.25).all()
+    assert trainer.renderer.pairs == 0
+    trainer.compare(trainer.target(np.zeros((20, 20, 3), np.float32)), 0.2)
+    assert not trainer.differentiate(g, cam).any()
 
 
 def test_more_pairs_than_there_is_room_for():
     rng = np.random.default_rng(5)
     g, cam = cloud(40, rng), camera(64, 48, rng)
     g[7:10] += 3
-    roomy, tight = Engine(40, 64, 48, Rendering(NEAR)), Engine(40, 64, 48, Rendering(NEAR))
-    tight._make_room(16)
-    np.testing.assert_array_equal(roomy.draw(g, cam), tight.draw(g, cam))
+    target = rng.uniform(0, 1, (48, 64, 3)).astype(np.float32)
+    found = []
+    for room in (None, 16):
+        trainer = Trainer(40, 64, 48, Rendering(NEAR))
+        if room:
+            trainer.renderer._make_room(room)
+            trainer.differentiate(g, cam)  # makes room for as few gradients
+        picture = trainer.renderer.draw(g, cam)
+        trainer.compare(trainer.target(target), 0.2)
+        found.append((picture, trainer.differentiate(g, cam)))
+    for roomy, tight in zip(*found, strict=True):
+        np.testing.assert_array_equal(roomy, tight)
+
+
+def test_drawing_makes_no_room_for_gradients():
+    tracemalloc.start()
+    renderer = Renderer(50_000, 64, 64, Rendering(NEAR))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(renderer.slots.tile) == 8 * 50_000
+    assert peak < 50_000 * 350  # bytes; those of the pairs' gradients would be 384 more
+    assert len(Trainer(50, 64, 64, Rendering(NEAR)).pair_gradient) == 0
 
 
 def test_splats_at_one_depth():
@@ -189,9 +212,9 @@ def test_splats_at_one_depth():
     rng = np.random.default_rng(6)
     g, cam = cloud(30, rng), camera(32, 32, rng)
     g[0:3] = g[0:3, :1]
-    engine = Engine(30, 32, 32, Rendering(NEAR))
-    engine.draw(g, cam)
-    assert (engine.slots > 0).sum() == (engine.extents[:, 3] > 0).sum()
+    renderer = Renderer(30, 32, 32, Rendering(NEAR))
+    renderer.draw(g, cam)
+    assert (renderer.slots.number > 0).sum() == (renderer.splats.extents[:, CUT] > 0).sum()
 
 
 def test_the_filter_keeps_a_small_splats_light():
@@ -202,7 +225,7 @@ def test_the_filter_keeps_a_small_splats_light():
         g = layout.empty(1, 1)
         g[7:10], g[10], g[11:14] = np.log(0.015) - shrink * np.log(2), 9, 1
         for name, values in light.items():
-            values.append(Engine(1, 32, 32, Rendering(NEAR, **FILTERS[name])).draw(g, cam).sum())
+            values.append(Renderer(1, 32, 32, Rendering(NEAR, **FILTERS[name])).draw(g, cam).sum())
     assert light["mip"][0] / light["mip"][1] > 3
     assert light["3dgs"][0] / light["3dgs"][1] < 1.3
 
@@ -217,9 +240,10 @@ def test_the_benchmarks_torch_step_does_the_same_work():
     rates = np.full(len(g), 1e-4, np.float32)
     slow = TorchStep(g, rates)
     losses = [slow(cam, torch.tensor(target.transpose(2, 0, 1).copy())) for _ in range(2)]
-    engine = Engine(80, 40, 32, Rendering(NEAR))
-    planes, moments = engine.planes.target(target), (np.zeros_like(g), np.zeros_like(g))
+    trainer = Trainer(80, 40, 32, Rendering(NEAR))
+    planes, moments = trainer.target(target), Moments.zeros(g)
     for number, wanted in enumerate(losses, start=1):
-        assert abs(engine.step(g, moments, cam, planes, rates, number, 0.2) - wanted) < 2e-4
+        loss = trainer.step(g, moments, cam, planes, Rates.of_step(number, rates), Weights(0.2))
+        assert abs(loss - wanted) < 2e-4
     updated = np.stack([row.detach().numpy() for row in slow.rows])
     assert np.median(np.abs(updated - g)) < 2e-5

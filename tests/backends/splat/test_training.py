@@ -10,6 +10,7 @@ from viewbench.backends import splat
 from viewbench.backends._psnr import psnr_db
 from viewbench.backends._types import Budget, Report, TrainingSet
 from viewbench.backends.splat import layout, loop, ply, stages
+from viewbench.backends.splat.backward import Moments
 from viewbench.backends.splat.options import Rendering
 from viewbench.backends.splat.relocate import relocate
 from viewbench.backends.splat.snapshot import State
@@ -100,11 +101,11 @@ def test_pictures_of_half_the_size_come_first(data, tmp_path, monkeypatch):
     monkeypatch.setattr(stages, "SMALLEST", 8)
     sizes = []
 
-    def note(engine, *arguments, real=stages.Engine.step):
-        sizes.append(engine.width)
-        return real(engine, *arguments)
+    def note(trainer, *arguments, real=stages.Trainer.step):
+        sizes.append(trainer.renderer.width)
+        return real(trainer, *arguments)
 
-    monkeypatch.setattr(stages.Engine, "step", note)
+    monkeypatch.setattr(stages.Trainer, "step", note)
     run(data, tmp_path, 100, coarse=0.25)
     assert sizes[1:] == [SIZE // 2] * 25 + [SIZE] * 75  # the very first warms up
     assert score(tmp_path, data) > 20
@@ -204,11 +205,11 @@ def test_relocation_hardly_changes_the_picture(data):
     g[10, :30] = -9  # faded out
     g[10, 30:] = np.abs(g[10, 30:])
     before = np.stack(list(loop.draw(g, data.cameras, Rendering())))
-    moments = np.ones_like(g), np.ones_like(g)
+    moments = Moments(np.ones_like(g), np.ones_like(g))
     assert relocate(g, moments, rng) == 30
     after = np.stack(list(loop.draw(g, data.cameras, Rendering())))
     assert np.abs(after - before).mean() < 0.02
-    assert not moments[0][:, :30].any()
+    assert not moments.first[:, :30].any()
     assert (1 / (1 + np.exp(-g[10])) > 0.004).all()
 
 
