@@ -8,6 +8,7 @@ a larger one, so that one run serves every ratio, `FACTORS` names the factors of
     select(views: Views, count: int, rng: numpy.random.Generator, **parameters) -> Choice
 
 chooses. It may raise UserError. Everything else (normalisation, features, the count) is decided before it is called.
+One that needs more than is always installed says by `available() -> str | None` why it cannot run here.
 """
 
 from collections.abc import Mapping
