@@ -65,6 +65,7 @@ pytest: dev
 bench: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_selectors.py $(BENCH)
 	$(THREADS) $(BIN)/python tests/bench/bench_splat.py $(BENCH)
+	$(THREADS) $(BIN)/python tests/bench/bench_encoder.py $(BENCH)
 
 quality: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_quality.py $(BENCH)

