@@ -43,8 +43,10 @@ def _read(file: BinaryIO) -> dict[str, np.ndarray]:
     for key in Tensors(file, storages).load():
         storage = storages[key]
         (count,) = np.frombuffer(file.read(8), dtype="<i8")
-        if count != len(storage) or file.readinto(storage.data.cast("B")) != storage.nbytes:
+        elements = file.read(storage.nbytes)
+        if count != len(storage) or len(elements) != storage.nbytes:
             raise ValueError("cut short")
+        storage[:] = np.frombuffer(elements, dtype=storage.dtype)
     return {name: np.array(array, order="C") for name, array in table.items()}
 
 

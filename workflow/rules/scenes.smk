@@ -51,7 +51,7 @@ rule features:
     message:
         "features of {wildcards.scene}"
     shell:
-        "viewbench features {wildcards.scene:q} --encoder {params.encoder:q} --out {output:q} 2> {log:q}"
+        "viewbench features {wildcards.scene:q} --encoder {params.encoder:q} --out {output:q} > /dev/null 2> {log:q}"
 
 
 # Runs again exactly when the trainings do that wait for it.
