@@ -60,7 +60,7 @@ def arguments(study: str, out: Path, jobs: int | None, options: tuple[str, ...] 
     given = str(Path(study).absolute()) if study.endswith((".yaml", ".yml")) else study
     profile = PACKAGE / "workflow" / "profiles" / "default"
     command = [sys.executable, "-m", "snakemake", "--snakefile", PACKAGE / "Snakefile", "--workflow-profile", profile]
-    command += ["--directory", out, "--cores", jobs or "all", "--config", f"study={given}", *options]
+    command += ["--config", f"study={given}", "--directory", out, "--cores", jobs or "all", *options]
     return [str(part) for part in command]
 
 
