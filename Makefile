@@ -25,8 +25,7 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "viewbench needs Python 3.11 or newer; name one with make PYTHON=..."; exit 1; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "Installing viewbench and what it needs into $(VENV) (a minute or two)"
-	@$(PIP) torch torchvision
-	@$(PIP) -e .
+	@$(PIP) -e '.[study]'
 	@$(BIN)/viewbench --version
 	@touch $@
 
@@ -64,6 +63,7 @@ pytest: dev
 bench: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_selectors.py $(BENCH)
 	$(THREADS) $(BIN)/python tests/bench/bench_splat.py $(BENCH)
+	$(THREADS) $(BIN)/python tests/bench/bench_encoder.py $(BENCH)
 
 quality: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_quality.py $(BENCH)

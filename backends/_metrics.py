@@ -7,6 +7,7 @@ from typing import cast
 
 import numpy as np
 
+from ..common import extras  # no source: it says what to install
 from ..common.errors import UserError
 from ..common.files import sha256_file
 
@@ -59,6 +60,7 @@ def lpips(image: np.ndarray, truth: np.ndarray, weights: Path) -> float:
     image, truth: (H, W, 3) in [0, 1]. `weights` is torchvision's AlexNet file.
     Raises UserError when the `lpips` package, which carries the linear heads, is not installed.
     """
+    extras.need("lpips", "torch", "torchvision", use="LPIPS needs", extra="lpips")
     import torch
 
     model = _lpips_model(weights)
@@ -77,10 +79,8 @@ def _lpips_model(weights: Path):
     from ..common.torchvision_cpu import import_torchvision
 
     import_torchvision()
-    try:
-        from lpips import LPIPS
-    except ImportError:
-        raise UserError("LPIPS needs the package lpips: pip install 'viewbench[lpips]'") from None
+    from lpips import LPIPS
+
     model = LPIPS(net="alex", pnet_rand=True, verbose=False).eval()
     state = torch.load(weights, map_location="cpu", weights_only=True)
     layers = [model.net.slice1, model.net.slice2, model.net.slice3, model.net.slice4, model.net.slice5]

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..common import extras
 from ..common.errors import UserError, nearest
 from ..common.files import whole
 
@@ -15,7 +16,7 @@ def plot(path: Path, title: str, positions: np.ndarray, forward: np.ndarray, cho
     """Draws all frames grey and the chosen ones with their viewing direction.
 
     `positions` (N, 3) in scene units, `forward` (N, 3) unit viewing directions, `chosen` (K,) indices in the order
-    chosen. Raises UserError for a kind of file that is not drawn, or without plotly where `.html` is asked for.
+    chosen. Raises UserError for a kind of file that is not drawn, and where the package that draws it is missing.
     """
     draw = _interactive if kind_of(path) == ".html" else _from_above
     with whole(path) as temporary:
@@ -23,10 +24,11 @@ def plot(path: Path, title: str, positions: np.ndarray, forward: np.ndarray, cho
 
 
 def kind_of(path: Path) -> str:
-    """The ending of the file, one of KINDS. Raises UserError for another."""
+    """The ending of the file, one of KINDS. Raises UserError for another, and where what draws it is not installed."""
     kind = path.suffix.lower()
     if kind not in KINDS:
         raise UserError(f"--plot '{path}': expected a file ending in one of {', '.join(KINDS)}{nearest(kind, KINDS)}")
+    extras.need("plotly" if kind == ".html" else "matplotlib", use="a picture of the choice needs", extra="plot")
     return kind
 
 
@@ -72,10 +74,8 @@ def _from_above(path: Path, title: str, positions: np.ndarray, forward: np.ndarr
 
 
 def _interactive(path: Path, title: str, positions: np.ndarray, forward: np.ndarray, chosen: np.ndarray) -> None:
-    try:
-        import plotly.graph_objects as go
-    except ImportError:
-        raise UserError("an interactive picture needs plotly: pip install 'viewbench[plot]'") from None
+    import plotly.graph_objects as go
+
     from ._topview import plane
 
     tips = positions[chosen] + _arrow(positions) * forward[chosen]

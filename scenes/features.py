@@ -33,7 +33,8 @@ def features(
 
     `encoder` is NAME or NAME:ARGUMENT. Every picture's row is a file in `cache`, named by the hash of the picture's
     bytes, in a folder named by the encoder's version: a run that was killed goes on where it was, captures share
-    pictures, and a picture that changed is embedded again. `device` is torch's, or "auto".
+    pictures, and a picture that changed is embedded again. `device` is torch's, or "auto" for a GPU where there is
+    one; an encoder that has no use for it ignores it.
 
     Raises UserError for an unknown or unavailable encoder and for a picture that cannot be read.
     """
@@ -50,7 +51,7 @@ def features(
     rows = [cached(file) for file in files]
     missing = [i for i, row in enumerate(rows) if row is None]
     if missing:
-        size, encode = module.encoder(argument, _device(device))
+        size, encode = module.encoder(argument, device)
         for start in range(0, len(missing), batch):
             part = missing[start : start + batch]
             pictures = np.stack([picture(split.paths[i], size) for i in part])
@@ -124,11 +125,3 @@ def cached(file: Path) -> np.ndarray | None:
         return np.load(file, allow_pickle=False)
     except (OSError, ValueError, EOFError):
         return None
-
-
-def _device(device: str) -> str:
-    if device != "auto":
-        return device
-    import torch
-
-    return "cuda" if torch.cuda.is_available() else "cpu"

@@ -13,6 +13,8 @@ A selector that compiles something may have
     warm() -> None
 
 which does so, into a cache: a study calls it once before several jobs choose by it.
+
+One that needs more than is always installed says by `available() -> str | None` why it cannot run here.
 """
 
 from collections.abc import Mapping

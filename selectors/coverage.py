@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 
+from ..common import extras  # no source: it says what to install
 from ..common.errors import UserError
 from ._types import Choice, Views
 
@@ -19,6 +20,11 @@ FACTORS = ()
 PARAMETERS = {"lam": 0.05, "spacing": 0.5}
 GROWTH = 0.2  # of the bounding box, on each side
 TIE = 1e-9  # gains that differ by less are the same: many views see equally many regions, but for rounding
+
+
+def available() -> str | None:
+    """Why it cannot run here, or None."""
+    return extras.missing("numba")
 
 
 def warm() -> None:

@@ -1,5 +1,6 @@
 """Fixtures that several folders share."""
 
+import fcntl
 import json
 import os
 import shutil
@@ -37,6 +38,37 @@ def small_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / f"transforms_{split}.json").write_text(json.dumps(transforms), encoding="utf-8")
     shutil.copy(ROOM / "points3d.ply", folder / "points3d.ply")
     return folder
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], object]], Path]:
+    """A folder that is filled once, also where several processes run the tests: `once(name, fill)`."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+    def once(name: str, fill: Callable[[Path], object]) -> Path:
+        folder = shared / name
+        with open(shared / f"{name}.lock", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not (shared / f"{name}.done").exists():
+                shutil.rmtree(folder, ignore_errors=True)
+                folder.mkdir()
+                fill(folder)
+                (shared / f"{name}.done").touch()
+        return folder
+
+    return once
+
+
+@pytest.fixture(scope="session")
+def wheel(once) -> Path:
+    """The wheel of this checkout."""
+
+    def build(folder: Path) -> None:
+        command = [sys.executable, "-m", "build", "--wheel", "--outdir", str(folder), str(PACKAGE)]
+        subprocess.run(command, check=True, capture_output=True)
+
+    return next(once("wheel", build).glob("*.whl"))
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError
 from ...common.files import read_json, write_json
 from ...common.settings import Settings
@@ -48,10 +49,9 @@ class Gsplat:
     )
 
     def available(self) -> str | None:
-        if importlib.util.find_spec("torch") is None:
-            return "torch is not installed; pip install 'viewbench[gpu]'"
-        if importlib.util.find_spec("gsplat") is None:
-            return "the package gsplat is not installed; pip install 'viewbench[gpu]'"
+        reason = extras.missing("gsplat", "torch", use="training on a GPU needs", extra="gpu")
+        if reason:
+            return reason
         if not self.device.startswith("cuda"):
             return f"[compute] device is '{self.device}', and gsplat needs a CUDA device; set it to 'auto' or 'cuda'"
         import torch

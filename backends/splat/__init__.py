@@ -1,12 +1,12 @@
 """3D Gaussian splatting on the CPU, one thread: trains from points, writes a model.ply that any splat viewer opens."""
 
 import importlib.metadata
-import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError
 from ...common.files import read_json
 from ...scenes.types import Cameras
@@ -18,7 +18,7 @@ CAPABILITIES = Capabilities(device="cpu", resumes=True, default_iterations=3000,
 
 def available() -> str | None:
     """Why it cannot run here, or None."""
-    return None if importlib.util.find_spec("numba") else "pip install numba"
+    return extras.missing("numba")
 
 
 def version() -> str:

@@ -1,7 +1,6 @@
 """Any image encoder of open_clip, as open_clip:MODEL/TAG; the paper's is ViT-SO400M-14-SigLIP-384/webli."""
 
 import importlib.metadata
-import importlib.util
 import logging
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import cast
 
 import numpy as np
 
+from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError, nearest
 from ...common.files import sha256_file
 
@@ -17,7 +17,7 @@ DEFAULT = "ViT-SO400M-14-SigLIP-384/webli"
 
 def available() -> str | None:
     """Why the encoder cannot be used here, or None; whether its weights are in reach shows when they are asked for."""
-    return None if importlib.util.find_spec("open_clip") else "pip install open_clip_torch"
+    return extras.missing("open_clip", "torch", "torchvision", use="the encoder open_clip needs", extra="clip")
 
 
 def version(argument: str) -> str:
@@ -56,6 +56,8 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
         ) from None
     finally:
         logging.disable(logging.NOTSET)
+    if device == "auto":
+        device = "cuda" if torch.cuda.is_available() else "cpu"
     model.eval().to(device)
     settings = open_clip.get_model_preprocess_cfg(model)
     size = settings["size"] if isinstance(settings["size"], int) else int(settings["size"][0])

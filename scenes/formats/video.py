@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError
 from ...common.files import read_json, sha256_file, user_cache, whole_folder, write_json
 from ..types import Scene, Split
@@ -15,6 +16,11 @@ WRITABLE = True
 POSED = False
 SUFFIXES = {".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v"}
 SMALL = 384  # pixels of the longer side of the frames that features and sharpness are computed from
+
+
+def available() -> str | None:
+    """Why videos cannot be read here, or None."""
+    return extras.missing("av")
 
 
 def detect(root: Path) -> str | None:
@@ -69,11 +75,10 @@ def _upright(frame: Any) -> Any:
 
 
 def _frames(root: Path) -> Iterator[Any]:
-    try:
-        import av
-        from av.error import FFmpegError
-    except ImportError:
-        raise UserError("reading a video needs PyAV: pip install 'viewbench[video]'") from None
+    extras.need("av")
+    import av
+    from av.error import FFmpegError
+
     try:
         with av.open(str(root)) as container:
             if not container.streams.video:

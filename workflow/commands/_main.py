@@ -8,7 +8,7 @@ import sys
 import click
 
 from ... import __version__
-from ...common import plugins
+from ...common import extras, plugins
 from ...common.errors import UserError
 
 PACKAGE = "workflow.commands"
@@ -43,15 +43,20 @@ def group() -> None:
 
 
 def run(arguments: list[str] | None = None) -> int:
-    """Runs one command and returns the exit status: 0, 2 for a user's mistake, 130 when interrupted."""
+    """Runs one command and returns the exit status: 0 or the command's, 2 for a user's mistake, 130 when stopped."""
     signal.signal(signal.SIGTERM, _stop)  # so that temporary files are removed on the way out
     try:
-        group.main(arguments, prog_name="viewbench", standalone_mode=False)
+        status = group.main(arguments, prog_name="viewbench", standalone_mode=False)
         sys.stdout.flush()
     except UserError as error:
         return _fail(str(error))
     except click.ClickException as error:
         return _fail(" ".join(error.format_message().split()))
+    except ModuleNotFoundError as error:
+        answer = extras.answer(error)
+        if answer is None:
+            raise
+        return _fail(answer)
     except (KeyboardInterrupt, click.Abort):
         print("viewbench: stopped", file=sys.stderr)
         return 130
@@ -62,7 +67,7 @@ def run(arguments: list[str] | None = None) -> int:
         if error.errno is None:
             raise
         return _fail(f"{error.strerror}: '{error.filename}'" if error.filename else str(error.strerror))
-    return 0
+    return status or 0
 
 
 def _fail(message: str) -> int:

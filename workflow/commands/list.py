@@ -9,7 +9,8 @@ KINDS = ("scenes", "formats", "selectors", "encoders", "backends", "reports", "s
 @click.argument("kind", type=click.Choice(KINDS))
 def command(kind: str) -> None:
     """Print what there is of KIND, one line each, and why something is unavailable."""
-    rows = {"scenes": _scenes, "backends": _backends, "studies": _studies}.get(kind, lambda: _plugins(kind))()
+    special = {"scenes": _scenes, "backends": _backends, "reports": _reports, "studies": _studies}
+    rows = special.get(kind, lambda: _plugins(kind))()
     width = max((len(name) for name, _ in rows), default=0)
     for name, text in rows:
         click.echo(f"{name:<{width}}  {text}".rstrip())
@@ -21,11 +22,17 @@ def _plugins(kind: str) -> list[tuple[str, str]]:
     package = {"formats": "scenes.formats", "encoders": "scenes.encoders"}.get(kind, kind)
     rows = []
     for name in plugins.names(package):
-        reason = None
-        if kind == "encoders":
-            reason = getattr(plugins.load(package, name), "available", lambda: None)()
+        reason = getattr(plugins.load(package, name), "available", lambda: None)()
         rows.append((name, plugins.summary(package, name) + (f" [unavailable: {reason}]" if reason else "")))
     return rows
+
+
+def _reports() -> list[tuple[str, str]]:
+    from ...common import extras, plugins
+
+    reason = extras.missing("matplotlib", "jinja2")
+    state = f" [unavailable: {reason}]" if reason else ""
+    return [(name, plugins.summary("reports", name) + state) for name in plugins.names("reports")]
 
 
 def _scenes() -> list[tuple[str, str]]:
@@ -62,11 +69,15 @@ def _backends() -> list[tuple[str, str]]:
 
 
 def _studies() -> list[tuple[str, str]]:
+    from ...common import extras
     from ...common import settings as settings_file
     from ...common.errors import UserError
     from .. import _study
 
     settings = settings_file.load()
+    reason = extras.missing("snakemake", "jsonschema", "yaml")
+    if reason:
+        return [(name, f"[unavailable: {reason}]") for name in _study.names()]
     rows = []
     for name in _study.names():
         try:

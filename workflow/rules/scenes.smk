@@ -51,7 +51,7 @@ rule features:
     message:
         "features of {wildcards.scene}"
     shell:
-        "viewbench features {wildcards.scene:q} --encoder {params.encoder:q} --out {output:q} 2> {log:q}"
+        "viewbench features {wildcards.scene:q} --encoder {params.encoder:q} --out {output:q} > /dev/null 2> {log:q}"
 
 
 # These two run again exactly when the trainings, and the selections, do that wait for them.

@@ -1,0 +1,98 @@
+"""Run a study anywhere: the workflow that ships with viewbench, in a folder of yours."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+NEEDED = ("snakemake", "jsonschema", "yaml", "numba", "skimage", "matplotlib", "jinja2", "mlflow")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+# Settings that name what is read; what is written (results/...) belongs to the folder of the study.
+READ = {
+    "VIEWBENCH_DATA": ("data", "root"),
+    "VIEWBENCH_METRICS_LPIPS_WEIGHTS": ("metrics", "lpips_weights"),
+    "VIEWBENCH_INSTANT_NGP_PATH": ("instant_ngp", "path"),
+    "VIEWBENCH_INSTANT_NGP_PYTHON": ("instant_ngp", "python"),
+}
+
+
+@click.command()
+@click.argument("study")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=".", help="Folder to run in.")
+@click.option("-j", "--jobs", type=click.IntRange(min=1), help="Jobs at once; one for each processor without it.")
+@click.argument("options", nargs=-1, metavar="[-- OPTIONS OF SNAKEMAKE]")
+@click.pass_context
+def command(context: click.Context, study: str, out: Path, jobs: int | None, options: tuple[str, ...]) -> None:
+    """Run STUDY, the name of one that ships or a file, and print where its page is.
+
+    --out gets results/STUDY, as a clone does, with results/features and results/mlflow.db beside it; without it the
+    study runs where you stand. The same command again runs what is missing or changed, and nothing else.
+
+    Settings are those in force where you stand, whatever --out is: the file that VIEWBENCH_ENVIRONMENT names, or
+    environment.toml here, or the one that ships. Relative paths of what is read count from here, those of what is
+    written from --out.
+
+    What stands behind -- goes to snakemake: viewbench run quick -- --dry-run
+    """
+    from ...common import extras
+    from ...common import settings as settings_file
+    from .. import _study
+
+    extras.need(*NEEDED, use="running a study needs", extra="study")
+    settings = settings_file.load()
+    name = _study.load(study, settings).name
+    out.mkdir(parents=True, exist_ok=True)
+    status = _wait(subprocess.Popen(arguments(study, out, jobs, options), env=environment(settings)))
+    page = out / "results" / name / "reports" / "index.html"
+    if status == 0 and page.is_file():
+        click.echo(page)
+    context.exit(status)
+
+
+def arguments(study: str, out: Path, jobs: int | None, options: tuple[str, ...] = ()) -> list[str]:
+    """The command line that runs the study in the folder `out`."""
+    from ...common.settings import PACKAGE
+
+    given = str(Path(study).absolute()) if study.endswith((".yaml", ".yml")) else study
+    profile = PACKAGE / "workflow" / "profiles" / "default"
+    command = [sys.executable, "-m", "snakemake", "--snakefile", PACKAGE / "Snakefile", "--workflow-profile", profile]
+    command += ["--config", f"study={given}", "--directory", out, "--cores", jobs or "all", *options]
+    return [str(part) for part in command]
+
+
+def environment(settings: Any) -> dict[str, str]:
+    """Variables for Snakemake and its jobs, which run in another folder: these settings, this `viewbench`.
+
+    One thread a job as `compute.threads` says, unless the caller has set otherwise.
+    """
+    found = dict(os.environ)
+    found["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), found.get("PATH", os.defpath)])
+    found["VIEWBENCH_ENVIRONMENT"] = str(settings.source.absolute())
+    for variable, (section, key) in READ.items():
+        value = getattr(getattr(settings, section), key)
+        path = Path(value).expanduser()
+        if value and not path.is_absolute() and path.exists():
+            found[variable] = str(path.absolute())
+    return dict.fromkeys(THREADS, str(settings.compute.threads)) | found
+
+
+def _wait(process: subprocess.Popen) -> int:
+    """Exit status of Snakemake, 130 when it was interrupted; it ends its jobs before it ends."""
+    interrupted = False
+
+    def interrupt(number: int, frame: object) -> None:
+        nonlocal interrupted
+        interrupted = True
+        if not sys.stdin.isatty():  # from a terminal Ctrl-C has reached Snakemake too
+            process.send_signal(signal.SIGINT)
+
+    signal.signal(signal.SIGINT, interrupt)
+    signal.signal(signal.SIGTERM, lambda *_: process.send_signal(signal.SIGTERM))
+    status = process.wait()
+    if interrupted:
+        raise KeyboardInterrupt
+    return status if status >= 0 else 128 - status
