@@ -12,6 +12,7 @@ from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError, nearest
 from ...common.files import sha256_file
 
+GPU = True  # it uses one where there is one
 DEFAULT = "ViT-SO400M-14-SigLIP-384/webli"
 
 
@@ -33,6 +34,7 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
     `argument` is MODEL/TAG, where TAG names pretrained weights or is the path of a file with them. Raises UserError
     for an unknown model, a missing tag, and weights that are neither on disk nor in reach of a hub.
     """
+    from ...common import gpu  # no source: which device it is changes nothing
     from ...common.torchvision_cpu import import_torchvision
 
     import_torchvision()
@@ -56,6 +58,8 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
         ) from None
     finally:
         logging.disable(logging.NOTSET)
+    if gpu.hold(device) is not None and device != "auto":
+        device = "cuda"  # the one that is held, whichever its number
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     model.eval().to(device)
