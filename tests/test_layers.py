@@ -62,7 +62,7 @@ def test_editors_find_the_package_by_its_name():
 
 @pytest.mark.slow
 def test_a_fresh_clone_shows_no_red_line(tmp_path):
-    """Before anything is installed: what is missing is a warning, and nothing is an error. `make types` is for after."""
+    """Before anything is installed what is missing is a warning, and nothing an error; `make types` is for after."""
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(tmp_path / "bare")], check=True)
     python = tmp_path / "bare" / "bin" / "python"
     command = [sys.executable, "-m", "pyright", "--outputjson", "--pythonpath", str(python), "--project", str(PACKAGE)]
