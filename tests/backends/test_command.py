@@ -61,7 +61,7 @@ def test_the_program_sees_the_chosen_views_and_no_name_of_theirs(take_views, tmp
     assert trained.seeding == Seeding(points="scene", source="scene", count=200, of=200, scene_points=200)
 
 
-@pytest.mark.parametrize(("source", "count"), [("none", 0), ("random", 100_000)])
+@pytest.mark.parametrize(("source", "count"), [("none", 0), ("random", 100_000), ("rays", 100_000), ("auto", 286)])
 def test_the_points_of_all_views_can_be_kept_from_the_program(take_views, tmp_path, source, count):
     code = "import pathlib, sys; print(pathlib.Path(sys.argv[1], 'points3d.ply').exists()); open('model', 'w')"
     trained = train(load(train=[*python(code), "{scene}"]), take_views(), tmp_path / "m", options={"points": source})
