@@ -41,13 +41,16 @@ _held: Lease | None = None
 
 
 def devices() -> list[str]:
-    """The devices that this process may use: those of CUDA_VISIBLE_DEVICES, or else all that nvidia-smi names."""
+    """The devices that this process may use: those of CUDA_VISIBLE_DEVICES, or else all that nvidia-smi names.
+
+    The latter by UUID: CUDA counts by speed and nvidia-smi by bus, so that a number may mean two devices.
+    """
     given = os.environ.get(VISIBLE)
     if given is not None:
         names = [name.strip() for name in given.split(",")]
         usable = names[: names.index("-1")] if "-1" in names else names  # as CUDA reads it
         return [name for name in usable if name]
-    return list(_identities())
+    return list(_identities().values())
 
 
 def hold(wanted: str = "cuda") -> Lease | None:

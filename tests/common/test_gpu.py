@@ -64,7 +64,7 @@ def appears(path: Path, seconds: float = 20) -> str:
 def test_three_jobs_on_two_devices(two):
     jobs = {name: start(two, name) for name in "ab"}
     taken = {name: appears(two / f"{name}.start").split()[0] for name in "ab"}
-    assert set(taken.values()) == {"0", "1"}, "side by side they get different devices"
+    assert set(taken.values()) == {"GPU-aa", "GPU-bb"}, "side by side they get different devices"
     jobs["c"] = start(two, "c")
     assert "waiting for a GPU (2 in use by other jobs)" in known(jobs["c"].stderr).readline()
     assert not (two / "c.start").exists()
@@ -95,7 +95,7 @@ def test_one_device_has_one_lock_by_whichever_name(two):
     first = start(two, "a", CUDA_VISIBLE_DEVICES="GPU-bb")
     assert appears(two / "a.start").split()[0] == "GPU-bb"
     second = start(two, "b")
-    assert appears(two / "b.start").split()[0] == "0"
+    assert appears(two / "b.start").split()[0] == "GPU-aa"
     third = start(two, "c", CUDA_VISIBLE_DEVICES="1")
     assert "waiting" in known(third.stderr).readline()
     for name in "abc":
@@ -105,7 +105,7 @@ def test_one_device_has_one_lock_by_whichever_name(two):
 
 @pytest.mark.parametrize(
     ("given", "expected"),
-    [(None, ["0", "1"]), ("1", ["1"]), ("", []), ("-1", []), ("1,-1,0", ["1"]), ("GPU-bb, 0", ["GPU-bb", "0"])],
+    [(None, ["GPU-aa", "GPU-bb"]), ("1", ["1"]), ("", []), ("-1", []), ("1,-1,0", ["1"]), ("GPU-bb, 0", ["GPU-bb", "0"])],
 )
 def test_devices_given_from_outside_are_respected(two, monkeypatch, given, expected):
     if given is not None:
@@ -115,7 +115,7 @@ def test_devices_given_from_outside_are_respected(two, monkeypatch, given, expec
 
 def test_a_device_that_is_named_is_the_one(two):
     job = start(two, "a", "cuda:1")
-    assert appears(two / "a.start").split()[0] == "1"
+    assert appears(two / "a.start").split()[0] == "GPU-bb"
     (two / "a.go").touch()
     assert job.wait(20) == 0
 
