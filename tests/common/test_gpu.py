@@ -105,7 +105,14 @@ def test_one_device_has_one_lock_by_whichever_name(two):
 
 @pytest.mark.parametrize(
     ("given", "expected"),
-    [(None, ["GPU-aa", "GPU-bb"]), ("1", ["1"]), ("", []), ("-1", []), ("1,-1,0", ["1"]), ("GPU-bb, 0", ["GPU-bb", "0"])],
+    [
+        (None, ["GPU-aa", "GPU-bb"]),
+        ("1", ["1"]),
+        ("", []),
+        ("-1", []),
+        ("1,-1,0", ["1"]),
+        ("GPU-bb, 0", ["GPU-bb", "0"]),
+    ],
 )
 def test_devices_given_from_outside_are_respected(two, monkeypatch, given, expected):
     if given is not None:
