@@ -141,7 +141,6 @@ def test_a_budget_that_the_command_line_needs_is_asked_for(take_views, tmp_path)
         ({"background": [0.1, 0.2]}, "expected red, green and blue"),
         ({"background": [0.0, 0.0, 255.0]}, "expected red, green and blue"),
         ({"train": ["python", "/opt/3dgs/train.py", "--eval"]}, "holds out every 8th of the chosen views"),
-        ({"train": ["/3dgs/train.py", "--eval", "--llffhold", "8"]}, "add --llffhold 0"),
     ],
 )
 def test_a_section_that_cannot_work_is_refused_before_anything_runs(changes, message):
