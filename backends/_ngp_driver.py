@@ -84,7 +84,7 @@ def train(
     testbed = testbed_of(checkout)
     testbed.load_training_data(str(scene))
     modes = getattr(import_pyngp(checkout), "TrainMode", None)
-    if modes is not None:  # checkouts before 2024 have but this one
+    if modes is not None:  # older checkouts have but this one
         testbed.nerf.training.train_mode = modes.Nerf
     testbed.reload_network_from_file(str(configurations(checkout)[network]))
     if near >= 0:

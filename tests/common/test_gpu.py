@@ -1,5 +1,6 @@
 """One GPU a job, with devices that do not exist: nvidia-smi is a script that answers what a file says."""
 
+import fcntl
 import os
 import signal
 import subprocess
@@ -11,12 +12,14 @@ import pytest
 
 from tests.conftest import known
 from viewbench.common import gpu
+from viewbench.common.errors import UserError
 
 JOB = """
 import os, sys, time
 from pathlib import Path
 from tests.conftest import known
 from viewbench.common import gpu
+from viewbench.common.errors import UserError
 lease = gpu.hold(sys.argv[3] if len(sys.argv) > 3 else "cuda")
 name = os.environ["CUDA_VISIBLE_DEVICES"]
 Path(sys.argv[1], f"{sys.argv[2]}.start").write_text(f"{name} {time.monotonic()}")
@@ -111,6 +114,9 @@ def test_one_device_has_one_lock_by_whichever_name(two):
         ("", []),
         ("-1", []),
         ("1,-1,0", ["1"]),
+        ("0,0", ["0"]),
+        ("NoDevFiles", []),
+        ("0,x,1", ["0"]),
         ("GPU-bb, 0", ["GPU-bb", "0"]),
     ],
 )
@@ -134,6 +140,28 @@ def test_a_device_that_others_use_is_said_to_be_shared(two, apps, shared):
     appears(two / "a.start")
     (two / "a.go").touch()
     assert f"'shared': {shared}" in job.communicate(timeout=20)[0]
+
+
+def test_a_device_that_is_not_there_is_refused(two, monkeypatch):
+    monkeypatch.setattr(gpu, "_held", None)
+    with pytest.raises(UserError, match="device is 'cuda:5', and there are 2 devices"):
+        gpu.hold("cuda:5")
+
+
+def test_a_file_system_without_locks_keeps_nobody_from_a_device(two, monkeypatch):
+    def refuse(file, how):
+        raise OSError(9, "Bad file descriptor")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    assert gpu._lock("GPU-aa") == -1
+
+
+def test_a_program_that_came_later_is_seen(two):
+    job = start(two, "a")
+    appears(two / "a.start")
+    (two / "apps").write_text("GPU-aa, 7\n")
+    (two / "a.go").touch()
+    assert "'shared': True" in job.communicate(timeout=20)[0]
 
 
 def test_no_device_is_none(monkeypatch, tmp_path):
