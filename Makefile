@@ -18,7 +18,7 @@ help:
 	@echo "make dashboard   MLflow over the runs just made, on http://127.0.0.1:5000"
 	@echo "make test        linters, type checks and tests"
 	@echo "make bench       timings, as ratios measured side by side"
-	@echo "make gpu         what needs a GPU, tried and recorded (10 minutes); a sentence where there is none"
+	@echo "make gpu         what needs a GPU, tried and recorded (10 minutes; GPU=--real for a capture too)"
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
 
@@ -67,7 +67,7 @@ bench: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_encoder.py $(BENCH)
 
 gpu: dev
-	@$(BIN)/python -m tests.gpu
+	@$(BIN)/python -m tests.gpu $(GPU)
 
 quality: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_quality.py $(BENCH)

@@ -49,6 +49,8 @@ def evaluate(
     backend = _registry.load(train["backend"], settings)
     if backend.CAPABILITIES.device == "cuda":
         gpu.hold(_registry.device_of(settings))
+    elif "backends.gsplat" in getattr(backend, "RENDERERS", ()):
+        gpu.hold(settings.compute.device)  # whose rasteriser draws where there is a GPU
     reason = backend.available()
     if reason:
         raise UserError(f"backend '{train['backend']}' is not available: {reason}")

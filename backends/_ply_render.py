@@ -7,25 +7,21 @@ from types import ModuleType
 
 import numpy as np
 
-from ..common import gpu
 from ..scenes.types import Cameras
 from . import _gaussian_ply
 
 NEAR = 0.01  # scene units
 
 
-def render_ply(path: Path, cameras: Cameras, background: Sequence[float]) -> Iterator[np.ndarray]:
-    """(H, W, 3) float32 in [0, 1], one for each camera: by gsplat where there is a GPU, else on the CPU.
+def render_ply(path: Path, cameras: Cameras, background: Sequence[float], device: str) -> Iterator[np.ndarray]:
+    """(H, W, 3) float32 in [0, 1], one for each camera: by gsplat where there is a GPU, else by splat.
 
-    background: red, green, blue in [0, 1], those that the model was trained on.
-
+    background: red, green, blue in [0, 1], those that the model was trained on; device: "cpu" for splat in any case.
     Raises UserError for a file that is no such PLY.
     """
     gaussians = _gaussian_ply.load(path)
-    gpu.hold()
     gsplat = _module("gsplat").Gsplat()
-    reason = gsplat.available()
-    if reason is None:
+    if device != "cpu" and gsplat.available() is None:
         renderer = _module("gsplat.renderer").Renderer(gsplat.rasterizer(), gsplat.device, background, NEAR)
         yield from renderer.images(renderer.parameters(gaussians), cameras, gaussians.degree)
         return
@@ -34,10 +30,10 @@ def render_ply(path: Path, cameras: Cameras, background: Sequence[float]) -> Ite
     yield from _module("splat.loop").draw(model, cameras, rendering)
 
 
-def ply_renderer() -> str:
+def ply_renderer(device: str) -> str:
     """What `render_ply` draws with here."""
     gsplat = _module("gsplat").Gsplat()
-    return gsplat.version() if gsplat.available() is None else "splat"
+    return gsplat.version() if device != "cpu" and gsplat.available() is None else "splat"
 
 
 def _module(name: str) -> ModuleType:

@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from ..common.errors import UserError
 from ..common.files import sha256_file
 from ..scenes.image_files import is_file
 
@@ -28,12 +29,15 @@ def program_version(command: list[str]) -> str:
 
     A console script is only the door to its package: then name and version of that package come first. Every Python
     program depends on the packages beside it, a script in a git checkout on the rest of the checkout, and any program
-    on its own files.
+    on its own files. Raises UserError where the program is not there, or its packages cannot be listed.
     """
     files = named_files(command)
+    if not files:
+        raise UserError(f"'{command[0]}' is not installed or not on PATH")
     parts = []
     python = next((found for file in files if (found := _python_of(file))), None)
-    if python is not None and (listed := _listed(python)) is not None:
+    if python is not None:
+        listed = _listed(python)
         owner = next((listed["owners"][file.name] for file in files if file.name in listed["owners"]), None)
         if owner is not None:
             parts.append(f"{owner} {listed['packages'].get(owner, '?')}")
@@ -72,13 +76,13 @@ def _python_of(file: Path) -> str | None:
     return next((word for word in reversed(words) if PYTHON.fullmatch(Path(word).name)), None)
 
 
-def _listed(python: str) -> dict | None:
+def _listed(python: str) -> dict:
     try:
         # Not in the current folder, where Python would look for packages too.
         asked = {"cwd": tempfile.gettempdir(), "timeout": SECONDS, "check": True}
         return json.loads(subprocess.run([python, "-c", LISTING], capture_output=True, text=True, **asked).stdout)
-    except (OSError, subprocess.SubprocessError, ValueError):
-        return None
+    except (OSError, subprocess.SubprocessError, ValueError) as error:
+        raise UserError(f"'{python}' does not say which packages it has: {error}") from None
 
 
 def _checkout(file: Path) -> str | None:
@@ -89,7 +93,8 @@ def _checkout(file: Path) -> str | None:
     """
 
     def git(*arguments: str) -> bytes:
-        command = ["git", "-C", str(file.parent), *arguments]
+        # A checkout of another user's is not refused: nothing of it is run.
+        command = ["git", "-c", "safe.directory=*", "-C", str(file.parent), *arguments]
         return subprocess.run(command, capture_output=True, timeout=SECONDS, check=True).stdout
 
     try:

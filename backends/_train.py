@@ -147,6 +147,8 @@ def _work_folder(out: Path, asked: dict[str, Any], resumes: bool) -> Path:
     if work.exists() and not (resumes and same):
         shutil.rmtree(work)
     (work / "model").mkdir(parents=True, exist_ok=True)
+    for half_written in (work / "model").glob(".part-*"):
+        half_written.unlink()
     asked_file.write_text(text, encoding="utf-8")
     return work
 

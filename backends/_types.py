@@ -102,7 +102,7 @@ class Seeding:
     points: str = "none"  # the source that was asked for: see _points
     source: str = "none"  # what they are: "scene and sweep"
     count: int = 0  # of all, those of the shell too
-    of: int = 0  # how many the scene has
+    of: int = 0  # how many of the scene's it may know: none where the source is for scenes without any
     scene_points: int = 0
     sweep_points: int = 0  # at depths that a plane sweep is sure of,
     guessed_points: int = 0  # and of pixels beside them

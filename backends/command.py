@@ -54,7 +54,7 @@ def configured(argument: str, settings: Settings) -> Any:
     entry = settings.command[argument]
     where = f"{settings.source} [command.{argument}]"
     _check(entry, where)
-    return External(argument, entry)
+    return External(argument, entry, settings.compute.device)
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,7 @@ class External:
 
     name: str
     entry: Command
+    device: str = "auto"  # of the settings, for what viewbench draws itself
 
     @property
     def CAPABILITIES(self) -> Capabilities:  # noqa: N802 - the name that the protocol gives it
@@ -92,7 +93,7 @@ class External:
 
     def drawn_by(self) -> str:
         """What draws its models here: it does, or one of our rasterisers does."""
-        return self._what if self.entry.render else ply_renderer()
+        return self._what if self.entry.render else ply_renderer(self.device)
 
     def available(self) -> str | None:
         for part, command in (("train", self.entry.train), ("render", self.entry.render)):
@@ -159,7 +160,7 @@ class External:
         Without that command the output is a PLY file of 3D Gaussians, which viewbench renders itself.
         """
         if not self.entry.render:
-            yield from render_ply(model / self.entry.output, cameras, self.entry.background)
+            yield from render_ply(model / self.entry.output, cameras, self.entry.background, self.device)
             return
         with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
             place = Path(folder).resolve()

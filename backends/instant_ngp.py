@@ -1,5 +1,6 @@
 """Instant-ngp, the hash-grid radiance field, run from a checkout of its own that environment.toml names."""
 
+import hashlib
 import shutil
 import subprocess
 import sys
@@ -70,23 +71,20 @@ class InstantNgp:
         return None
 
     def version(self) -> str:
-        """The checkout's commit, where it is a git checkout, and a hash of the module that was built there."""
+        """The checkout's commit, where it is a git checkout, and hashes of its networks and the module built there."""
         if not self.checkout:
             raise UserError(f"instant-ngp has no version: no checkout is configured; {BUILD}")
         folder = Path(self.checkout).expanduser()
         module = next(iter(_ngp_driver.modules(folder)), None)
         built = "no module" if module is None else f"sha256:{sha256_file(module)[:12]}"
+        networks = "".join(f"{name} {sha256_file(file)}\n" for name, file in _ngp_driver.configurations(folder).items())
+        built += f", networks {hashlib.sha256(networks.encode()).hexdigest()[:12]}"
         command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=CHECK_SECONDS, check=True)
             return f"instant-ngp {done.stdout.strip()}, {built}"
         except (OSError, subprocess.SubprocessError):
             return f"instant-ngp {built}"
-
-    def configuration(self) -> dict[str, dict[str, Any]]:
-        """The networks' files, which anyone may edit without building the module again."""
-        networks = _ngp_driver.configurations(Path(self.checkout).expanduser()) if self.checkout else {}
-        return {"train": {"networks": {name: sha256_file(file)[:12] for name, file in networks.items()}}}
 
     def train(
         self, data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict[str, Any], report: Report

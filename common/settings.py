@@ -165,6 +165,8 @@ def _section(kind: type, values: Any, where: str) -> Any:
         numbers = items == (float,)
         if wanted is list and not all(isinstance(item, (int, float) if numbers else str) for item in value):
             raise UserError(f"{where}: '{name}' must be a list of {'numbers' if numbers else 'strings'}")
+        if numbers:
+            values = {**values, name: [float(item) for item in value]}
     try:
         return kind(**values)
     except TypeError:

@@ -14,6 +14,7 @@ import numpy as np
 from ..common import plugins
 from ..common.errors import UserError
 from ..common.files import sha256_file, whole
+from ..common.sources import code_sha256
 from .types import Split
 
 ENCODERS = "scenes.encoders"
@@ -45,7 +46,8 @@ def features(
     reason = module.available()
     if reason:
         raise UserError(f"encoder '{encoder}' is not available: {reason}")
-    made_by = f"{name}: {module.version(argument)}; {DECODING}"
+    code = code_sha256(module.__name__.removeprefix("viewbench."))[:16] if hasattr(module, "__name__") else ""
+    made_by = f"{name}: {module.version(argument)}; numpy {np.__version__}; {code}; {DECODING}"
     folder = Path(cache) / f"{name}-{hashlib.sha256(made_by.encode()).hexdigest()[:16]}"
     files = [folder / f"{content_hash(path)}.npy" for path in split.paths]
     rows = [cached(file) for file in files]

@@ -1,15 +1,16 @@
-"""Everything that needs a GPU, in one go of some ten minutes: `make gpu`, or `python -m tests.gpu`.
+"""Everything that needs a GPU, in one go of some ten minutes: `make gpu`, or `python -m tests.gpu [--real]`.
 
-The backend suite on gsplat, gsplat's kernels against splat's, the study `gpu` (and `gpu-real` where its capture is)
-with both, instant-ngp where environment.toml names a checkout; then a table, and a recording of each study with machine
-and versions. Where there is no GPU it says so in one sentence, and what no GPU has tried is not said to work.
+The backend suite on gsplat, gsplat's kernels against splat's, and the study `gpu` with both, and with instant-ngp where
+environment.toml names a checkout; with --real the study `gpu-real` too, where its capture is. Then a table, and a
+recording of each study with machine and versions. Where there is no GPU it says so in one sentence, and what no GPU has
+tried is not said to work.
 """
 
 import csv
-import os
 import platform
 import subprocess
 import sys
+import time
 from collections import defaultdict
 from collections.abc import Iterable
 from pathlib import Path
@@ -20,6 +21,7 @@ from viewbench.common import settings as settings_file
 from viewbench.common.files import read_json
 from viewbench.common.settings import PACKAGE
 from viewbench.reports._statistics import summary
+from viewbench.workflow.commands import run
 
 SUITE = ("tests/backends/test_every_backend.py", "tests/backends/gsplat")
 STUDIES = ("gpu", "gpu-real")
@@ -41,18 +43,35 @@ def main() -> int:
         print(f"{name}: {reason or _registry.load(name, settings).version()}")
     if reasons["gsplat"]:
         return 1
+    began = time.monotonic()
+    if _run("-m", "viewbench", "warm", "--backend", "gsplat"):
+        return 1
+    print(f"gsplat's CUDA code is there after {time.monotonic() - began:.0f} s")
     status = _run("-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", _tests(reasons), *SUITE)
-    for study in STUDIES:
+    for study in STUDIES if "--real" in sys.argv else STUDIES[:1]:
         if not _has_scenes(study, settings):
             print(f"study {study}: its capture is not here; set VIEWBENCH_DATA to the folder of captures")
             continue
-        status |= _run("-m", "snakemake", "-j2", "--config", f"study={study}", "--", "reports")
+        file = _with_instant_ngp(study) if reasons["instant-ngp"] is None else study
+        status |= _run("-m", "snakemake", "-j2", "--config", f"study={file}", "--", "reports")
         results = Path("results") / study
         if (results / "results.csv").is_file():
             print("\n".join(table(results)))
             note = "made by make gpu"
             status |= _run("-m", "viewbench", "record", str(results), "--name", study, "--note", note)
     return int(status != 0)
+
+
+def _with_instant_ngp(study: str) -> str:
+    """A file of the study with instant-ngp among its backends, of the same name."""
+    from viewbench.workflow import _study
+
+    text = (_study.STUDIES / f"{study}.yaml").read_text(encoding="utf-8")
+    line = "  - {backend: instant-ngp, budget: {iterations: 5000}}\n"
+    file = PACKAGE / "results" / f"{study}.yaml"
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(text.replace("backends:\n", "backends:\n" + line), encoding="utf-8")
+    return str(file)
 
 
 def _tests(reasons: dict[str, str | None]) -> str:
@@ -62,9 +81,8 @@ def _tests(reasons: dict[str, str | None]) -> str:
 
 def _run(*arguments: str) -> int:
     print("$ python", *arguments, flush=True)
-    return subprocess.run(
-        [sys.executable, *arguments], cwd=PACKAGE, env={**os.environ, "OMP_NUM_THREADS": "1"}
-    ).returncode
+    environment = run.environment(settings_file.load())
+    return subprocess.run([sys.executable, *arguments], cwd=PACKAGE, env=environment).returncode
 
 
 def _has_scenes(study: str, settings: settings_file.Settings) -> bool:

@@ -216,10 +216,12 @@ class Wiring:
     def limit(self, workflow: Any) -> None:
         """Lets as many jobs that need a GPU run at once as this machine has, unless `--resources gpu=N` says how many.
 
-        On a cluster it is for the scheduler to say.
+        It knows no executor yet: a profile for a cluster sets `resources`, and leaves the limit to the scheduler.
         """
         count = len(gpu.devices())
-        if workflow.local_exec and count and "gpu" not in workflow.global_resources:
+        if count and self.settings.compute.device.startswith("cuda:"):
+            count = 1
+        if count and "gpu" not in workflow.global_resources:
             workflow.register_resource("gpu", count)
 
     def gpu(self, wildcards: Any) -> int:

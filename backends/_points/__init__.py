@@ -31,6 +31,7 @@ class Wanted:
 
     source: str  # of SOURCES
     most: int | None = None  # of all; None for all that the scene has, and `drawn` where it has none
+    fills: bool = False  # whether there should be `most`, for a trainer that makes no more
     drawn: int = DRAWN
     sweep: float = SWEEP
 
@@ -64,9 +65,10 @@ def starting_points(
             most -= round(wanted.sweep * most)
         starts = scene_points(data, source, most, rng)
     total = wanted.most
-    if total is None:
+    if total is None or not wanted.fills:
         known = _number(starts)
-        total = round(known / (1 - wanted.sweep)) if known and wanted.sweep < 1 else max(wanted.drawn, known)
+        natural = round(known / (1 - wanted.sweep)) if known and wanted.sweep < 1 else max(wanted.drawn, known)
+        total = natural if total is None else min(total, natural)
     if source in ("auto", "sweep"):
         swept_starts, found = swept(data, total - _number(starts), around, rng)
         starts += swept_starts

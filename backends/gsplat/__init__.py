@@ -71,7 +71,7 @@ class Gsplat:
         """
         try:
             from gsplat.cuda import _backend
-        except (ImportError, OSError, RuntimeError) as error:
+        except (ImportError, OSError, RuntimeError, IndexError) as error:  # the last where torch finds no device
             raise UserError(f"gsplat's CUDA code could not be compiled: {error}; {REMEDY}") from None
         if _backend._C is None:
             raise UserError(NOT_COMPILED)
@@ -93,7 +93,7 @@ class Gsplat:
         _check(options)
         data = knowing(data, options["points"])
         around = surroundings(data.training, data.points)
-        wanted = Wanted(options["points"], options["gaussians"] or None, options["drawn_points"])
+        wanted = Wanted(options["points"], options["gaussians"] or None, drawn=options["drawn_points"])
         starts, seeding = starting_points(data, wanted, around, np.random.default_rng(seed))
         task = Task(data, around, out, seed, budget, options, report)
         gaussians, near, trained = fit(task, starts, self.device, self.rasterizer())

@@ -14,6 +14,7 @@ from .densification import Densification
 from .gaussians import Optimizers, Parameters
 
 FILE = "snapshot.npz"
+PLAIN = ("step", "seconds", "peak_gpu_bytes", "order", "curve")
 
 
 @dataclass
@@ -23,6 +24,7 @@ class State:
     rng: np.random.Generator
     step: int = 0
     seconds: float = 0.0
+    peak_gpu_bytes: int = 0  # of the parts of the run that were killed
     order: list[int] = field(default_factory=list)  # views left of this round
     curve: list[dict[str, float | None]] = field(default_factory=list)
 
@@ -41,8 +43,11 @@ class State:
         arrays |= {f"strategy.{key}": v for key, v in densification.state.items() if isinstance(v, torch.Tensor)}
         arrays["torch.cpu"] = torch.get_rng_state()
         if torch.cuda.is_initialized():
+            self.peak_gpu_bytes = max(self.peak_gpu_bytes, torch.cuda.max_memory_allocated())
             arrays["torch.cuda"] = torch.cuda.get_rng_state()
-        plain: dict[str, Any] = {name: getattr(self, name) for name in ("step", "seconds", "order", "curve")}
+        plain: dict[str, Any] = {
+            name: getattr(self, name) for name in ("step", "seconds", "peak_gpu_bytes", "order", "curve")
+        }
         plain |= {"rng": self.rng.bit_generator.state, "rate": optims["means"].param_groups[0]["lr"]}
         stored: dict[str, Any] = {name: value.cpu().numpy() for name, value in arrays.items()}
         with whole(folder / FILE) as temporary, open(temporary, "wb") as file:

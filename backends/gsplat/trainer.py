@@ -66,12 +66,13 @@ def fit(task: Task, starts: list[Start], device: str, rasterize: Callable) -> tu
         ) from None
     used = torch.cuda.get_device_name(device) if device.startswith("cuda") else device
     found = {"n_primitives": len(params["means"]), "device": used, "threads": torch.get_num_threads()}
-    found["peak_gpu_bytes"] = torch.cuda.max_memory_allocated(device) if device.startswith("cuda") else None
+    earlier = run.pop("peak_gpu_bytes")
+    found["peak_gpu_bytes"] = max(earlier, torch.cuda.max_memory_allocated(device)) if device != "cpu" else None
     return arrays(params), renderer.near, {**run, **found}
 
 
 def _run(task: Task, params: Parameters, extent: float, renderer: Renderer) -> dict[str, Any]:
-    """Changes `params` in place, step by step; returns iterations, seconds and curve."""
+    """Changes `params` in place, step by step; returns iterations, seconds, curve and the killed parts' memory."""
     data, limit = task.data, task.budget.seconds
     steps = task.budget.iterations or PAPER_STEPS
     optims = optimizers(params, extent)
@@ -112,7 +113,8 @@ def _run(task: Task, params: Parameters, extent: float, renderer: Renderer) -> d
             saved = time.monotonic()
         clock.start()
     State.forget(task.out)
-    return {"iterations": state.step, "seconds": state.seconds, "curve": state.curve}
+    names = {"iterations": "step", "seconds": "seconds", "curve": "curve", "peak_gpu_bytes": "peak_gpu_bytes"}
+    return {name: getattr(state, field) for name, field in names.items()}
 
 
 def _probe(report: Report, params: Parameters, degree: int, renderer: Renderer) -> float | None:

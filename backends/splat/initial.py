@@ -24,7 +24,8 @@ def initial(
     """
     extent = around.extent
     shell_count = min(o.shell, o.gaussians // 2)
-    starts, seeding = starting_points(data, Wanted(o.points, o.gaussians - shell_count, sweep=o.sweep), around, rng)
+    wanted = Wanted(o.points, o.gaussians - shell_count, fills=True, sweep=o.sweep)
+    starts, seeding = starting_points(data, wanted, around, rng)
     points = np.concatenate([start.points for start in starts])
     scales = o.scale * np.maximum(spacing(points), 1e-6 * extent)
     if shell_count:

@@ -43,7 +43,7 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
     views = len(data.images)
     rng = np.random.default_rng(seed)
     gaussians, seeding = initial(data, o, around, rng)
-    if views < 2 and not seeding.scene_points:
+    if views < 2 and not (seeding.scene_points or seeding.random_points):
         raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
     rendering = Rendering(o.near * around.nearest, o.background, o.sh_degree, o.low_pass, o.antialias)
     full = Stage(data.images, data.cameras, gaussians.shape[1], rendering)

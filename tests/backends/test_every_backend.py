@@ -21,6 +21,7 @@ from viewbench.backends._train import WORK, train
 from viewbench.backends._types import SHARED, Budget, Job, Seeding
 from viewbench.common.errors import UserError
 from viewbench.common.settings import InstantNgp, Settings
+from viewbench.common.settings import load as load_settings
 from viewbench.scenes.images import load_images
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.types import Scene
@@ -32,7 +33,10 @@ ENOUGH = 400  # steps in which three small views are learnt
 
 @pytest.fixture(scope="module")
 def settings(tmp_path_factory) -> Settings:
-    """Settings in which everything is configured that can be."""
+    """Settings in which everything is configured that can be: the user's instant-ngp, or else one with a stand-in."""
+    real = load_settings().instant_ngp
+    if real.path:
+        return replace(PROGRAMS, instant_ngp=real)
     checkout = make_checkout(tmp_path_factory.mktemp("external") / "instant-ngp")
     return replace(PROGRAMS, instant_ngp=InstantNgp(path=str(checkout)))
 

@@ -60,9 +60,9 @@ def test_its_network_is_found_wherever_the_model_is_trained(checkout, take_views
         assert json.loads((tmp_path / name / "model.ingp").read_text())["network"] == {"encoding": name}
     with pytest.raises(UserError, match=r"has no network 'bgi'; did you mean 'big'\? \(base, big\)"):
         train(backend, take_views(), tmp_path / "m", network="bgi")
-    before = backend.configuration()
+    before = backend.version()
     (checkout / "configs" / "nerf" / "base.json").write_text("{}")
-    assert backend.configuration() != before, "an edited network is another training"
+    assert backend.version() != before, "an edited network is another training"
     (checkout / "configs" / "nerf" / "base.json").unlink()
     assert "has no configs/nerf/base.json" in backend.available()
 

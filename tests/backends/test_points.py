@@ -59,6 +59,15 @@ def test_every_source_obeys_a_limit_and_counts_what_it_gave(take_views, source):
     assert record["of"] == (0 if source in ("sweep", "rays", "random") else 200), "it knows no points of the scene"
 
 
+def test_a_trainer_that_grows_is_not_filled_at_the_start(take_views):
+    """gsplat with gaussians=28000 would never densify else."""
+    views = take_views(tuple(range(0, 400, 20)))
+    assert points_of(views, "random", most=5000, drawn=300)[2]["count"] == 300
+    assert points_of(views, "random", most=200, drawn=300)[2]["count"] == 200
+    assert points_of(views, "random", most=5000, fills=True, drawn=300)[2]["count"] == 5000
+    assert points_of(views, "auto", most=5000)[2]["count"] <= round(200 / (1 - SWEEP))
+
+
 def test_without_a_limit_all_points_of_the_scene_come_along(take_views):
     views = take_views(tuple(range(0, 400, 20)))
     assert points_of(views, "scene", drawn=7)[2]["count"] == 200

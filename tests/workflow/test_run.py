@@ -39,13 +39,15 @@ def test_the_command_line():
     command = run.arguments("quick", Path("lab"), None, ("--dry-run", "--resources", "gpu=1"))
     assert command[:3] == [sys.executable, "-m", "snakemake"]
     assert command[3:5] == ["--snakefile", str(PACKAGE / "Snakefile")]
-    rest = "--config study=quick --directory lab --cores all --dry-run --resources gpu=1"
+    rest = '--directory lab --cores all --dry-run --resources gpu=1 --config study="quick"'
     assert command[-9:] == rest.split()
+    command = run.arguments("quick", Path("lab"), None, ("--config", "other=1", "--dry-run"))
+    assert command[-4:] == ["--config", 'study="quick"', "other=1", "--dry-run"], "the last --config is the only one"
     assert "--cores 3" in " ".join(run.arguments("quick", Path(), 3))
 
 
 def test_a_study_file_is_found_from_where_one_stands(here):
-    assert f"study={here / 'mine.yaml'}" in run.arguments("mine.yaml", Path("lab"), None)
+    assert f'study="{here / "mine.yaml"}"' in run.arguments("mine.yaml", Path("lab"), None)
 
 
 def test_jobs_get_these_settings_and_this_viewbench(here, monkeypatch):

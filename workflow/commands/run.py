@@ -1,9 +1,11 @@
 """Run a study anywhere: the workflow that ships with viewbench, in a folder of yours."""
 
+import json
 import os
 import signal
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 from typing import Any
 
@@ -60,8 +62,14 @@ def arguments(study: str, out: Path, jobs: int | None, options: tuple[str, ...] 
     given = str(Path(study).absolute()) if study.endswith((".yaml", ".yml")) else study
     profile = PACKAGE / "workflow" / "profiles" / "default"
     command = [sys.executable, "-m", "snakemake", "--snakefile", PACKAGE / "Snakefile", "--workflow-profile", profile]
-    command += ["--config", f"study={given}", "--directory", out, "--cores", jobs or "all", *options]
-    return [str(part) for part in command]
+    command += ["--directory", out, "--cores", jobs or "all"]
+    # Of several --config the last counts alone, and values are YAML, in which a path may hold " #" or ": ".
+    config = ["--config", f"study={json.dumps(given)}"]
+    if "--config" in options:
+        at = options.index("--config") + 1
+        options = (*options[:at], config[1], *options[at:])
+        config = []
+    return [str(part) for part in (*command, *options, *config)]
 
 
 def environment(settings: Any) -> dict[str, str]:
@@ -70,7 +78,10 @@ def environment(settings: Any) -> dict[str, str]:
     One thread a job as `compute.threads` says, unless the caller has set otherwise.
     """
     found = dict(os.environ)
-    found["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), found.get("PATH", os.defpath)])
+    # Where pip puts `viewbench`: beside Python, or with --user in a folder of the user's.
+    user = sysconfig.get_preferred_scheme("user")
+    scripts = [str(Path(sys.executable).parent), sysconfig.get_path("scripts", user)]
+    found["PATH"] = os.pathsep.join([*scripts, found.get("PATH", os.defpath)])
     found["VIEWBENCH_ENVIRONMENT"] = str(settings.source.absolute())
     for variable, (section, key) in READ.items():
         value = getattr(getattr(settings, section), key)

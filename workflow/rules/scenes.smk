@@ -64,6 +64,9 @@ rule warm:
         touch(f"{RESULTS}/warm/{{backend}}"),
     log:
         f"{RESULTS}/logs/warm/{{backend}}.log",
+    # CUDA code is compiled for the device that is there.
+    resources:
+        gpu=WIRING.gpu,
     params:
         backend=lambda wildcards: STUDY.backend(wildcards.backend).backend,
     message:
