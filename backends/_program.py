@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..common.files import sha256_file
 from ..scenes.image_files import is_file
+from ._command_line import program
 
 LONGEST_NAME = 4096  # of a path; more is a script in the command line
 SECONDS = 60.0
@@ -49,9 +50,9 @@ def files_sha256(command: list[str]) -> str:
 
 
 def named_files(command: list[str]) -> list[Path]:
-    """Programs and scripts that a command line names, each once."""
+    """Programs and scripts that a command line names, each once; `env` before them is none."""
     files = []
-    for part in dict.fromkeys(command):
+    for part in dict.fromkeys(command[command.index(program(command)) :] if command else []):
         found = (shutil.which(part) if len(part) < LONGEST_NAME else None) or (part if is_file(Path(part)) else None)
         if found:
             files.append(Path(found))
