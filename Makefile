@@ -11,13 +11,14 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test lint types pytest bench quality external format clean clean-results
+.PHONY: help setup dev reports dashboard test lint types pytest bench gpu quality external format clean clean-results
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
 	@echo "make dashboard   MLflow over the runs just made, on http://127.0.0.1:5000"
 	@echo "make test        linters, type checks and tests"
 	@echo "make bench       timings, as ratios measured side by side"
+	@echo "make gpu         what needs a GPU, tried and recorded (10 minutes); a sentence where there is none"
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
@@ -65,6 +66,9 @@ bench: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_selectors.py $(BENCH)
 	$(THREADS) $(BIN)/python tests/bench/bench_splat.py $(BENCH)
 	$(THREADS) $(BIN)/python tests/bench/bench_encoder.py $(BENCH)
+
+gpu: dev
+	@$(BIN)/python -m tests.gpu
 
 quality: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_quality.py $(BENCH)

@@ -48,7 +48,7 @@ def evaluate(
     check_model(model, train, scene, scene_hash)
     backend = _registry.load(train["backend"], settings)
     if backend.CAPABILITIES.device == "cuda":
-        gpu.hold(settings.compute.device)
+        gpu.hold(_registry.device_of(settings))
     reason = backend.available()
     if reason:
         raise UserError(f"backend '{train['backend']}' is not available: {reason}")

@@ -3,7 +3,7 @@
     _ngp_driver.py check CHECKOUT
     _ngp_driver.py train CHECKOUT --scene FILE --snapshot FILE --record FILE --network NAME --steps N --seconds S
         --near D
-    _ngp_driver.py render CHECKOUT --snapshot FILE --cameras FILE --images FOLDER --samples N --near D
+    _ngp_driver.py render CHECKOUT --snapshot FILE --cameras FILE --images FOLDER --samples N
 
 The way of training and rendering is that of instant-ngp's scripts/run.py, which itself cannot do it: its screenshots
 know no principal point and one field of view for all. What is called, what it corresponds to, and where that was read
@@ -18,8 +18,11 @@ know no principal point and one field of view for all. What is called, what it c
                                    8-bit sRGB; focal lengths in pixels; cx, cy over the frame's own w, h
     reload_network_from_file       run.py --network; configs/nerf/base.json is its default. Before the clock starts,
                                    since it allocates and compiles
+    training.train_mode            run.py --train_mode nerf: the paper's loss. The default is RflRelax, which run.py
+                                   schedules and which falls back to Nerf where there is no JIT (testbed_nerf)
     training.near_distance         run.py --near_distance; negative leaves 0.1 in its own units
-    shall_train, frame()           run.py: one step a call; without a window nothing is drawn
+    shall_train, frame()           run.py: one step a call; without a window nothing is drawn. It sets shall_train back
+                                   when no ray meets anything, and frame() goes on returning True
     training_step, loss            run.py's progress bar; the loss is brought up to date every 16 steps
     save_snapshot(FILE, False)     run.py --save_snapshot: without the optimiser's state. It has the data set's scale,
                                    offset, aabb_scale and cameras, but no picture
@@ -28,7 +31,6 @@ know no principal point and one field of view for all. What is called, what it c
     exposure 0                     run.py's default
     snap_to_pixel_centers          run.py, for test views
     render_min_transmittance       run.py: 1e-4 for test views
-    render_near_distance           bindings; 0 by default
     set_nerf_camera_matrix         run.py: the upper three rows of transform_matrix, converted as the loader does
     fov_axis, relative_focal_length, screen_center
                                    testbed, set_camera_to_training_view: focal length over the size along fov_axis,
@@ -46,12 +48,14 @@ from typing import Any
 
 CURVE_POINTS = 20
 PYNGP = "build*/**/pyngp*"  # where CMake puts the module, by the README's build folder
+MODULES = (".so", ".pyd", ".py")
 MIN_TRANSMITTANCE = 1e-4  # as scripts/run.py scores test views
 
 
 def modules(checkout: Path) -> list[Path]:
-    """What CMake built; Python's own cache of a module says nothing of whether it is still there."""
-    return sorted(file for file in checkout.glob(PYNGP) if "__pycache__" not in file.parts)
+    """What CMake built, and none of what it needed for that (build/CMakeFiles/pyngp.dir); nor Python's own cache."""
+    found = (file for file in checkout.glob(PYNGP) if file.suffix in MODULES and "__pycache__" not in file.parts)
+    return sorted(file for file in found if file.is_file())
 
 
 def import_pyngp(checkout: Path) -> Any:
@@ -79,6 +83,9 @@ def train(
     """Trains until `steps` or `seconds` (0: no such limit), saves the network, and notes steps, seconds and losses."""
     testbed = testbed_of(checkout)
     testbed.load_training_data(str(scene))
+    modes = getattr(import_pyngp(checkout), "TrainMode", None)
+    if modes is not None:  # older checkouts have but this one
+        testbed.nerf.training.train_mode = modes.Nerf
     testbed.reload_network_from_file(str(configurations(checkout)[network]))
     if near >= 0:
         testbed.nerf.training.near_distance = near
@@ -87,6 +94,8 @@ def train(
     every = max(1, steps // CURVE_POINTS) if steps else 500
     began = time.perf_counter()
     while testbed.frame():
+        if not testbed.shall_train:
+            sys.exit('instant-ngp gave up: no ray met anything ("generated 0 samples"); is aabb_scale large enough?')
         step, elapsed = testbed.training_step, time.perf_counter() - began
         done = bool(steps and step >= steps) or bool(seconds and elapsed >= seconds)
         if done or step >= (len(curve) + 1) * every:
@@ -99,7 +108,7 @@ def train(
     record.write_text(json.dumps(result), encoding="utf-8")
 
 
-def render(checkout: Path, snapshot: Path, cameras: Path, images: Path, samples: int, near: float) -> None:
+def render(checkout: Path, snapshot: Path, cameras: Path, images: Path, samples: int) -> None:
     """Writes an (H, W, 3) float32 array in sRGB for every frame of the transforms file `cameras`, in its order."""
     import numpy as np
 
@@ -110,8 +119,6 @@ def render(checkout: Path, snapshot: Path, cameras: Path, images: Path, samples:
     testbed.exposure = 0.0
     testbed.snap_to_pixel_centers = True
     testbed.nerf.render_min_transmittance = MIN_TRANSMITTANCE
-    if near >= 0:
-        testbed.render_near_distance = near
     testbed.fov_axis = 0  # both focal lengths below are divided by the width
     for frame in json.loads(cameras.read_text(encoding="utf-8"))["frames"]:
         width, height = frame["w"], frame["h"]
@@ -129,7 +136,7 @@ def main() -> None:
     places = {"train": ("scene", "snapshot", "record"), "render": ("snapshot", "cameras", "images"), "check": ()}
     numbers: dict[str, dict[str, Any]] = {
         "train": {"network": str, "steps": int, "seconds": float, "near": float},
-        "render": {"samples": int, "near": float},
+        "render": {"samples": int},
     }
     for action, names in places.items():
         known = actions.add_parser(action)

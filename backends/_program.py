@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 import tempfile
@@ -13,6 +14,8 @@ from ._command_line import program
 
 LONGEST_NAME = 4096  # of a path; more is a script in the command line
 SECONDS = 60.0
+CODE = (".py", ".c", ".cpp", ".cu", ".cuh", ".h", ".hpp", ".so", ".toml", ".yaml", ".yml", ".json", ".sh")
+PYTHON = re.compile(r"python(\d+(\.\d+)?)?w?(\.exe)?")
 LISTING = """
 import importlib.metadata as m, json, sys
 packages = {d.metadata["Name"]: d.version for d in m.distributions()}
@@ -37,7 +40,7 @@ def program_version(command: list[str]) -> str:
             parts.append(f"{owner} {listed['packages'].get(owner, '?')}")
         lines = "".join(f"{name}=={version}\n" for name, version in sorted(listed["packages"].items()))
         parts.append(f"python {listed['python']} with packages {hashlib.sha256(lines.encode()).hexdigest()[:12]}")
-    parts += dict.fromkeys(state for file in files if (state := _checkout(file.resolve().parent)))
+    parts += dict.fromkeys(state for file in files if (state := _checkout(file.resolve())))
     return ", ".join([*parts, f"sha256:{files_sha256(command)}"])
 
 
@@ -52,8 +55,9 @@ def files_sha256(command: list[str]) -> str:
 def named_files(command: list[str]) -> list[Path]:
     """Programs and scripts that a command line names, each once; `env` before them is none."""
     files = []
-    for part in dict.fromkeys(command[command.index(program(command)) :] if command else []):
-        found = (shutil.which(part) if len(part) < LONGEST_NAME else None) or (part if is_file(Path(part)) else None)
+    for number, part in enumerate(dict.fromkeys(command[command.index(program(command)) :] if command else [])):
+        # Only the program is looked for on PATH: "black" may be a colour, and a program too.
+        found = shutil.which(part) if number == 0 else part if is_file(Path(part)) else None
         if found:
             files.append(Path(found))
     return files
@@ -61,12 +65,12 @@ def named_files(command: list[str]) -> list[Path]:
 
 def _python_of(file: Path) -> str | None:
     """The interpreter that a file is, or that its first line names."""
-    if file.name.startswith("python"):
+    if PYTHON.fullmatch(file.name):
         return str(file)
     with open(file, "rb") as script:
         line = script.readline(LONGEST_NAME)
     words = line[2:].decode("utf-8", "replace").split() if line.startswith(b"#!") else []
-    return next((word for word in reversed(words) if Path(word).name.startswith("python")), None)
+    return next((word for word in reversed(words) if PYTHON.fullmatch(Path(word).name)), None)
 
 
 def _listed(python: str) -> dict | None:
@@ -78,16 +82,26 @@ def _listed(python: str) -> dict | None:
         return None
 
 
-def _checkout(folder: Path) -> str | None:
-    """Commit of the git checkout that a folder lies in, and a hash of what was changed since; None outside of one."""
+def _checkout(file: Path) -> str | None:
+    """Commit of the git checkout that has a file, and a hash of what was changed and added since; None outside of one.
 
-    def git(*arguments: str) -> str:
-        command = ["git", "-C", str(folder), *arguments]
-        return subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=True).stdout
+    A checkout that merely lies around the file is another program's: a virtual environment in a clone, a home folder
+    under version control.
+    """
+
+    def git(*arguments: str) -> bytes:
+        command = ["git", "-C", str(file.parent), *arguments]
+        return subprocess.run(command, capture_output=True, timeout=SECONDS, check=True).stdout
 
     try:
-        commit = git("rev-parse", "--short=12", "HEAD").strip()
-        changed = git("diff", "HEAD")
-    except (OSError, subprocess.SubprocessError, UnicodeDecodeError):
+        git("ls-files", "--error-unmatch", file.name)
+        commit = git("rev-parse", "--short=12", "HEAD").decode().strip()
+        changed = git("diff", "--no-ext-diff", "--binary", "--submodule=diff", "HEAD")
+        top = Path(git("rev-parse", "--show-toplevel").decode().strip())
+        added = git("-C", str(top), "ls-files", "--others", "--exclude-standard", "-z").decode("utf-8", "replace")
+    except (OSError, subprocess.SubprocessError):
         return None
-    return commit + (f"+{hashlib.sha256(changed.encode()).hexdigest()[:8]}" if changed else "")
+    code = [top / name for name in added.split("\0") if Path(name).suffix in CODE]
+    hashes = "".join(f"{path.name} {sha256_file(path)}\n" for path in code if is_file(path))
+    state = changed + hashes.encode()
+    return commit + (f"+{hashlib.sha256(state).hexdigest()[:8]}" if state else "")

@@ -27,6 +27,11 @@ def load(name: str, settings: Settings) -> ModuleType | Any:
     return configure(argument, settings) if configure else module
 
 
+def device_of(settings: Settings) -> str:
+    """The device for a backend that needs a GPU: a program of its own takes one whatever is said of ours."""
+    return "cuda" if settings.compute.device == "cpu" else settings.compute.device
+
+
 def configuration_of(backend: Any) -> dict[str, dict[str, Any]]:
     """Settings of the machine that the backend's models ("train") and its renders ("render") depend on."""
     return {"train": {}, "render": {}} | getattr(backend, "configuration", dict)()

@@ -96,8 +96,7 @@ def _write_colmap(folder: Path, cameras: Cameras, points: tuple[np.ndarray, np.n
         for index, (xyz, rgb) in enumerate(zip(points[0].tolist(), points[1].tolist(), strict=True)):
             numbers = " ".join(map(repr, xyz))
             point_lines.append(f"{index + 1} {numbers} {rgb[0]} {rgb[1]} {rgb[2]} 0\n")
-    # test.txt: no view is held out by a 3DGS that reads it (--eval --llffhold 0).
-    for name, lines in (("cameras", camera_lines), ("images", image_lines), ("points3D", point_lines), ("test", [])):
+    for name, lines in (("cameras", camera_lines), ("images", image_lines), ("points3D", point_lines)):
         write_text(folder / f"{name}.txt", "".join(lines))
 
 

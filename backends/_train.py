@@ -52,7 +52,7 @@ def train(
     scene, and whatever the backend refuses.
     """
     backend = _registry.load(job.backend, settings)
-    lease = gpu.hold(settings.compute.device) if backend.CAPABILITIES.device == "cuda" else None
+    lease = gpu.hold(_registry.device_of(settings)) if backend.CAPABILITIES.device == "cuda" else None
     reason = backend.available()
     if reason:
         raise UserError(f"backend '{job.backend}' is not available: {reason}")

@@ -237,11 +237,6 @@ def _check(entry: Command, where: str) -> None:
     if entry.render and not given & {"name", "index"}:
         raise UserError(f"{where}: 'output' names one file for all renders; put {{name}} or {{index}} into it")
     if "--eval" in entry.train and any(Path(part).name == "train.py" for part in entry.train):
-        at = entry.train.index("--llffhold") if "--llffhold" in entry.train else None
-        if at is None or entry.train[at + 1 : at + 2] != ["0"]:
-            raise UserError(
-                f"{where}: with --eval, train.py of 3DGS holds out every 8th of the chosen views; leave it out, or add "
-                "--llffhold 0"
-            )
+        raise UserError(f"{where}: with --eval, train.py of 3DGS holds out every 8th of the chosen views; leave it out")
     if "iterations" in given | places_in(entry.render) and "iterations" not in places_in(entry.train):
         raise UserError(f"{where}: rendering takes {{iterations}}, which 'train' does not; write them out")

@@ -45,7 +45,7 @@ class InstantNgp:
         options={
             "network": DEFAULT_NETWORK,  # a file of its configs/nerf: base, big, small, …
             "aabb_scale": 4,  # side of the box in units of 1 / 0.33 scene units; the paper takes 16 for Replica
-            "near_distance": -1.0,  # where rays start, in its own units; negative leaves its default
+            "near_distance": -1.0,  # in its own units: density nearer to a camera is discouraged; negative: its default
             "samples": 8,  # per pixel of a render
         },
     )
@@ -119,7 +119,7 @@ class InstantNgp:
         usage = self._drive("train", arguments, out, out / LOG)
         shutil.rmtree(scene)
         record = read_json(out / RECORD, "instant-ngp's record")
-        write_json(out / RECORD, {**record, "samples": options["samples"], "near": options["near_distance"]})
+        write_json(out / RECORD, {**record, "samples": options["samples"]})
         return Trained(
             iterations=record["iterations"],
             seconds=record["seconds"],
@@ -140,7 +140,6 @@ class InstantNgp:
                 "cameras": place / "cameras.json",
                 "images": place,
                 "samples": record["samples"],
-                "near": record["near"],
             }
             self._drive("render", arguments, place, place / LOG)
             for index in range(len(cameras)):

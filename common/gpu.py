@@ -6,6 +6,7 @@ the same time is looked up and recorded, since timings of a shared GPU are not t
 """
 
 import contextlib
+import itertools
 import os
 import subprocess
 import sys
@@ -14,6 +15,8 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+
+from .errors import UserError
 
 VISIBLE = "CUDA_VISIBLE_DEVICES"
 FOLDER = "viewbench-gpu"  # in the folder of temporary files: for all users of the machine
@@ -32,7 +35,10 @@ class Lease:
     def record(self) -> dict[str, Any]:
         """What `train.json` says; `shared` is True where another program used the device too, None if nobody knows."""
         now = _programs(self.device)
-        shared = None if now is None else self.others > 0 or len(now - {os.getpid()}) > 1
+        # Where this process is named, every other is somebody's. Where it is not (it may have used none, or go by
+        # another number in a container), one may be itself.
+        ours = 0 if now is not None and os.getpid() in now else int("torch" in sys.modules)
+        shared = None if now is None else self.others > 0 or len(now - {os.getpid()}) > ours
         said = {key: value for key, value in asdict(self).items() if key in ("device", "waited_s")}
         return {**said, "shared": shared}
 
@@ -41,13 +47,17 @@ _held: Lease | None = None
 
 
 def devices() -> list[str]:
-    """The devices that this process may use: those of CUDA_VISIBLE_DEVICES, or else all that nvidia-smi names."""
+    """The devices that this process may use: those of CUDA_VISIBLE_DEVICES, or else all that nvidia-smi names.
+
+    The latter by UUID: CUDA counts by speed and nvidia-smi by bus, so that a number may mean two devices.
+    """
     given = os.environ.get(VISIBLE)
     if given is not None:
         names = [name.strip() for name in given.split(",")]
-        usable = names[: names.index("-1")] if "-1" in names else names  # as CUDA reads it
-        return [name for name in usable if name]
-    return list(_identities())
+        # CUDA reads up to the first that it does not know: -1, NoDevFiles, …
+        usable = itertools.takewhile(lambda name: name.isdigit() or name.startswith(("GPU-", "MIG-")), names)
+        return list(dict.fromkeys(usable))
+    return list(_identities().values())
 
 
 def hold(wanted: str = "cuda") -> Lease | None:
@@ -55,17 +65,20 @@ def hold(wanted: str = "cuda") -> Lease | None:
 
     Comes before CUDA is first asked for anything, since it reads CUDA_VISIBLE_DEVICES but once. `wanted` is "cuda" or
     "auto" for any of the devices, or "cuda:N" for one of them; whichever it is, it is the process's only one from then
-    on, and number 0. A second call changes nothing.
+    on, and number 0. A second call changes nothing. Raises UserError for a number that no device has.
     """
     global _held
     if _held is not None or wanted == "cpu":
         return _held
     names = devices()
     _, pinned, number = wanted.partition(":")
-    if pinned:
-        names = names[int(number) : int(number) + 1] if number.isdigit() else []
     if not names:
         return None
+    if pinned:
+        if not (number.isdigit() and int(number) < len(names)):
+            raise UserError(f"[compute] device is '{wanted}', and there are {len(names)} devices, cuda:0 and on")
+        names = [names[int(number)]]
+    os.environ.setdefault("CUDA_DEVICE_ORDER", "PCI_BUS_ID")  # as nvidia-smi counts, by whose numbers locks are named
     began, told = time.monotonic(), False
     while True:
         for name in names:
@@ -88,19 +101,25 @@ def _lock(device: str) -> int | None:
     except ImportError:
         return -1
     folder = Path(tempfile.gettempdir()) / FOLDER
-    with contextlib.suppress(FileExistsError):
-        folder.mkdir()
+    with contextlib.suppress(OSError):
+        folder.mkdir(exist_ok=True)
         folder.chmod(0o1777)
     path = folder / _identities().get(device, device).replace("/", "_")
     with contextlib.suppress(OSError):
         os.close(os.open(path, os.O_CREAT | os.O_EXCL, 0o666))
         path.chmod(0o666)
-    file = os.open(path, os.O_RDONLY)
+    try:
+        file = os.open(path, os.O_RDWR)
+    except OSError:
+        file = os.open(path, os.O_RDONLY)  # of another user; NFS wants more, a local file system does not
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(file)
         return None
+    except OSError:  # a file system without locks
+        os.close(file)
+        return -1
     return file
 
 

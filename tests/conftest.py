@@ -77,7 +77,7 @@ def data_root() -> Path:
     root = os.environ.get("VIEWBENCH_DATA")
     if not root:
         pytest.skip("the real captures are not here: VIEWBENCH_DATA is not set")
-    return Path(root)
+    return Path(known(root))
 
 
 @pytest.fixture(scope="session")

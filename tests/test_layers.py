@@ -4,6 +4,9 @@ The arrows are those of relative imports, which any editor and type checker foll
 """
 
 import ast
+import json
+import subprocess
+import sys
 
 import pytest
 
@@ -55,3 +58,17 @@ def test_the_package_is_imported_by_relative_names(folder):
 
 def test_editors_find_the_package_by_its_name():
     assert (PACKAGE / ".editor" / "viewbench").resolve() == PACKAGE
+
+
+@pytest.mark.slow
+def test_a_fresh_clone_shows_no_red_line(tmp_path):
+    """Before anything is installed what is missing is a warning, and nothing an error; `make types` is for after."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(tmp_path / "bare")], check=True)
+    python = tmp_path / "bare" / "bin" / "python"
+    command = [sys.executable, "-m", "pyright", "--outputjson", "--pythonpath", str(python), "--project", str(PACKAGE)]
+    found = json.loads(subprocess.run(command, capture_output=True, text=True).stdout)
+    errors = [item for item in found["generalDiagnostics"] if item["severity"] == "error"]
+    assert errors == []
+    assert found["summary"]["filesAnalyzed"] > 200
+    unresolved = [item["message"] for item in found["generalDiagnostics"] if '"viewbench' in item["message"]]
+    assert unresolved == [], "the package itself is found whatever the clone is called"

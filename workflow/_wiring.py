@@ -107,6 +107,12 @@ class Wiring:
         modules = ("workflow.commands.features", plugins.source_name("scenes.encoders", family))
         return self.lists.path("features", modules, {"encoder": self.study.encoder, "version": made_by}, READING)
 
+    @property
+    def encoder_gpu(self) -> int:
+        """GPUs that embedding a scene needs: the encoders that use one where there is one say so."""
+        uses = plugins.constant("scenes.encoders", self.study.encoder.partition(":")[0], "GPU", False)
+        return int(bool(uses) and self.settings.compute.device != "cpu" and bool(gpu.devices()))
+
     # Selections
 
     def features(self, wildcards: Any) -> list[str]:

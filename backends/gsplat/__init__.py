@@ -114,7 +114,8 @@ class Gsplat:
         if self.rasterize is not None:
             return self.rasterize
         self.warm()
-        from gsplat import rasterization
+        # Where the package is not installed, a type checker takes this folder for it.
+        from gsplat import rasterization  # pyright: ignore[reportAttributeAccessIssue]
 
         return rasterization
 

@@ -19,7 +19,8 @@ class Densification:
     """One of gsplat's strategies, its schedule squeezed to the length of the run."""
 
     def __init__(self, options: dict[str, Any], params: Parameters, optims: Optimizers, extent: float, steps: int):
-        from gsplat import DefaultStrategy, MCMCStrategy
+        # Where the package is not installed, a type checker takes this folder for it.
+        from gsplat import DefaultStrategy, MCMCStrategy  # pyright: ignore[reportAttributeAccessIssue]
 
         def squeezed(step: int, least: int = 1) -> int:
             return max(least, round(step * steps / PAPER_STEPS))

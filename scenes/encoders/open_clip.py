@@ -1,10 +1,11 @@
 """Any image encoder of open_clip, as open_clip:MODEL/TAG; the paper's is ViT-SO400M-14-SigLIP-384/webli."""
 
+import importlib
 import importlib.metadata
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import cast
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError, nearest
 from ...common.files import sha256_file
 
+GPU = True  # it uses one where there is one
 DEFAULT = "ViT-SO400M-14-SigLIP-384/webli"
 
 
@@ -33,11 +35,14 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
     `argument` is MODEL/TAG, where TAG names pretrained weights or is the path of a file with them. Raises UserError
     for an unknown model, a missing tag, and weights that are neither on disk nor in reach of a hub.
     """
+    from ...common import gpu  # no source: which device it is changes nothing
     from ...common.torchvision_cpu import import_torchvision
 
     import_torchvision()
-    import open_clip
     import torch
+
+    # By its name, since a type checker takes this file for a package that is not installed.
+    open_clip: Any = importlib.import_module("open_clip")
 
     name, _, tag = (argument or DEFAULT).partition("/")
     known = open_clip.list_models()
@@ -56,6 +61,8 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
         ) from None
     finally:
         logging.disable(logging.NOTSET)
+    if gpu.hold(device) is not None and device != "auto":
+        device = "cuda"  # the one that is held, whichever its number
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     model.eval().to(device)
@@ -66,7 +73,7 @@ def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.
     def encode(images: np.ndarray) -> np.ndarray:
         batch = torch.from_numpy(np.ascontiguousarray(images.transpose(0, 3, 1, 2))).to(device)
         with torch.inference_mode():
-            features = cast("open_clip.CLIP", model).encode_image((batch - mean) / spread)  # other classes have it too
+            features = model.encode_image((batch - mean) / spread)
             return features.float().cpu().numpy()
 
     return size, encode

@@ -41,7 +41,7 @@ def settings_with(**commands: Command) -> Settings:
 
 def make_checkout(folder: Path) -> Path:
     """A folder like a checkout of instant-ngp that has been built, with the stand-in for its module."""
-    (folder / "build").mkdir(parents=True)
+    (folder / "build" / "CMakeFiles" / "pyngp.dir").mkdir(parents=True)  # what CMake makes before the module
     shutil.copy(PYNGP, folder / "build" / "pyngp.py")
     (folder / "configs" / "nerf").mkdir(parents=True)
     for name in ("base", "big"):

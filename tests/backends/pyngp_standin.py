@@ -30,8 +30,15 @@ def nerf_matrix_to_ngp(matrix):
     return result[[1, 2, 0]]
 
 
+class TrainMode:
+    Nerf, Rfl, RflRelax = "Nerf", "Rfl", "RflRelax"
+
+
 class _Training:
-    __slots__ = ("near_distance",)
+    __slots__ = ("near_distance", "train_mode")
+
+    def __init__(self):
+        self.train_mode = TrainMode.RflRelax
 
 
 class _Nerf:
@@ -143,6 +150,10 @@ class Testbed:
                 self.reload_network_from_file()
             if self._network is None:
                 raise RuntimeError("Unable to create a neural network trainer.")
+            assert self.nerf.training.train_mode == TrainMode.Nerf  # else run.py's schedule is needed
+            if not self._dataset["frames"]:
+                self.shall_train = False  # "generated 0 samples. Aborting training."
+                return True
             time.sleep(0.001)
             self.training_step += 1
             self.loss = 1 / self.training_step
@@ -155,6 +166,10 @@ class Testbed:
 
     def load_snapshot(self, path):
         assert Path(path).suffix in (".ingp", ".msgpack")
+        # Comes with all that it was saved with, and a fresh `nerf`.
+        self.nerf, self.fov_axis, self.exposure, self.background_color = _Nerf(), 1, 0.0, [1.0, 1.0, 1.0, 1.0]
+        for name in ("relative_focal_length", "screen_center", "_camera"):
+            setattr(self, name, None)
         self._dataset = json.loads(Path(path).read_text(encoding="utf-8"))
 
     def set_nerf_camera_matrix(self, matrix):

@@ -75,13 +75,22 @@ def test_the_stand_in_asks_for_a_root_directory(checkout, take_views, tmp_path, 
     views = take_views()
     _subset.write(tmp_path / "scene", "transforms", views.cameras, views.images, extra={"aabb_scale": 4})
     monkeypatch.syspath_prepend(str(checkout / "build"))
-    testbed = __import__("pyngp").Testbed()
+    pyngp = __import__("pyngp")
+    testbed = pyngp.Testbed()
+    testbed.nerf.training.train_mode = pyngp.TrainMode.Nerf
     testbed.load_training_data(str(tmp_path / "scene" / "transforms.json"))
     testbed.shall_train = True
     with pytest.raises(RuntimeError, match="Unable to create a neural network trainer"):
         testbed.frame()
     testbed.root_dir = str(checkout)
     assert testbed.frame()
+
+
+def test_a_training_that_it_gives_up_does_not_go_on_for_ever(checkout, take_views, tmp_path):
+    module = checkout / "build" / "pyngp.py"
+    module.write_text(module.read_text().replace('if not self._dataset["frames"]:', "if self.training_step == 3:"))
+    with pytest.raises(UserError, match="instant-ngp gave up: no ray met anything"):
+        train(load(checkout), take_views(), tmp_path / "m")
 
 
 def test_the_seed_changes_the_order_of_frames_and_not_the_frames(checkout, take_views, tmp_path):

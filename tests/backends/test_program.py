@@ -1,5 +1,6 @@
 """What is recorded as the version of an external program."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -56,6 +57,51 @@ def test_the_rest_of_a_checkout_is_part_of_its_script(tmp_path):
     changed = program_version(command)
     (tmp_path / "other.py").write_text("a = 3")
     assert len({first, changed, program_version(command)}) == 3
+
+
+def test_a_checkout_around_a_program_is_not_its_own(tmp_path):
+    """A virtual environment in a clone of viewbench: no commit of ours makes another program another one."""
+    git(tmp_path, "init", "-q")
+    (tmp_path / ".gitignore").write_text("env/")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "-q", "-m", "x")
+    (tmp_path / "env").mkdir()
+    (tmp_path / "env" / "train.py").write_text("pass")
+    assert program_version(["sh", str(tmp_path / "env" / "train.py")]).startswith("sha256:")
+
+
+def test_untracked_code_and_binary_changes_are_seen(tmp_path):
+    (tmp_path / "train.py").write_text("import other")
+    (tmp_path / "data.bin").write_bytes(b"\xff\xfe\x00")
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "-q", "-m", "x")
+    command = ["sh", str(tmp_path / "train.py")]
+    seen = {program_version(command)}
+    (tmp_path / "data.bin").write_bytes(b"\xff\xfe\x01")
+    seen.add(program_version(command))
+    (tmp_path / "other.py").write_text("a = 1")
+    seen.add(program_version(command))
+    (tmp_path / "other.py").write_text("a = 2")
+    seen.add(program_version(command))
+    assert len(seen) == 4
+
+
+def test_a_word_that_is_also_a_program_is_a_word(tmp_path, monkeypatch):
+    tool = tmp_path / "black"
+    tool.write_text("#!/bin/sh\n")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    assert tool not in named_files(["sh", "--background-color", "black"])
+    assert named_files(["black"]) == [tool]
+
+
+def test_a_script_whose_name_begins_like_python_is_not_run_as_one(tmp_path):
+    script = tmp_path / "python_train.sh"
+    script.write_text(f"#!/bin/sh\ntouch {tmp_path}/ran\n")
+    script.chmod(0o755)
+    assert program_version([str(script)]).startswith("sha256:")
+    assert not (tmp_path / "ran").exists()
 
 
 def test_a_binary_has_a_hash(tmp_path):

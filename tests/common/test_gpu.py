@@ -1,5 +1,6 @@
 """One GPU a job, with devices that do not exist: nvidia-smi is a script that answers what a file says."""
 
+import fcntl
 import os
 import signal
 import subprocess
@@ -11,12 +12,14 @@ import pytest
 
 from tests.conftest import known
 from viewbench.common import gpu
+from viewbench.common.errors import UserError
 
 JOB = """
 import os, sys, time
 from pathlib import Path
 from tests.conftest import known
 from viewbench.common import gpu
+from viewbench.common.errors import UserError
 lease = gpu.hold(sys.argv[3] if len(sys.argv) > 3 else "cuda")
 name = os.environ["CUDA_VISIBLE_DEVICES"]
 Path(sys.argv[1], f"{sys.argv[2]}.start").write_text(f"{name} {time.monotonic()}")
@@ -64,7 +67,7 @@ def appears(path: Path, seconds: float = 20) -> str:
 def test_three_jobs_on_two_devices(two):
     jobs = {name: start(two, name) for name in "ab"}
     taken = {name: appears(two / f"{name}.start").split()[0] for name in "ab"}
-    assert set(taken.values()) == {"0", "1"}, "side by side they get different devices"
+    assert set(taken.values()) == {"GPU-aa", "GPU-bb"}, "side by side they get different devices"
     jobs["c"] = start(two, "c")
     assert "waiting for a GPU (2 in use by other jobs)" in known(jobs["c"].stderr).readline()
     assert not (two / "c.start").exists()
@@ -95,7 +98,7 @@ def test_one_device_has_one_lock_by_whichever_name(two):
     first = start(two, "a", CUDA_VISIBLE_DEVICES="GPU-bb")
     assert appears(two / "a.start").split()[0] == "GPU-bb"
     second = start(two, "b")
-    assert appears(two / "b.start").split()[0] == "0"
+    assert appears(two / "b.start").split()[0] == "GPU-aa"
     third = start(two, "c", CUDA_VISIBLE_DEVICES="1")
     assert "waiting" in known(third.stderr).readline()
     for name in "abc":
@@ -105,7 +108,17 @@ def test_one_device_has_one_lock_by_whichever_name(two):
 
 @pytest.mark.parametrize(
     ("given", "expected"),
-    [(None, ["0", "1"]), ("1", ["1"]), ("", []), ("-1", []), ("1,-1,0", ["1"]), ("GPU-bb, 0", ["GPU-bb", "0"])],
+    [
+        (None, ["GPU-aa", "GPU-bb"]),
+        ("1", ["1"]),
+        ("", []),
+        ("-1", []),
+        ("1,-1,0", ["1"]),
+        ("0,0", ["0"]),
+        ("NoDevFiles", []),
+        ("0,x,1", ["0"]),
+        ("GPU-bb, 0", ["GPU-bb", "0"]),
+    ],
 )
 def test_devices_given_from_outside_are_respected(two, monkeypatch, given, expected):
     if given is not None:
@@ -115,7 +128,7 @@ def test_devices_given_from_outside_are_respected(two, monkeypatch, given, expec
 
 def test_a_device_that_is_named_is_the_one(two):
     job = start(two, "a", "cuda:1")
-    assert appears(two / "a.start").split()[0] == "1"
+    assert appears(two / "a.start").split()[0] == "GPU-bb"
     (two / "a.go").touch()
     assert job.wait(20) == 0
 
@@ -127,6 +140,28 @@ def test_a_device_that_others_use_is_said_to_be_shared(two, apps, shared):
     appears(two / "a.start")
     (two / "a.go").touch()
     assert f"'shared': {shared}" in job.communicate(timeout=20)[0]
+
+
+def test_a_device_that_is_not_there_is_refused(two, monkeypatch):
+    monkeypatch.setattr(gpu, "_held", None)
+    with pytest.raises(UserError, match="device is 'cuda:5', and there are 2 devices"):
+        gpu.hold("cuda:5")
+
+
+def test_a_file_system_without_locks_keeps_nobody_from_a_device(two, monkeypatch):
+    def refuse(file, how):
+        raise OSError(9, "Bad file descriptor")
+
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    assert gpu._lock("GPU-aa") == -1
+
+
+def test_a_program_that_came_later_is_seen(two):
+    job = start(two, "a")
+    appears(two / "a.start")
+    (two / "apps").write_text("GPU-aa, 7\n")
+    (two / "a.go").touch()
+    assert "'shared': True" in job.communicate(timeout=20)[0]
 
 
 def test_no_device_is_none(monkeypatch, tmp_path):

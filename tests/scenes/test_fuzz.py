@@ -3,6 +3,7 @@
 import contextlib
 import json
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from typing import cast
 
@@ -142,7 +143,7 @@ def test_any_bytes_in_the_files_of_other_formats(form, tmp_path):
         finally:
             file.write_bytes(original)
 
-    check()
+    cast("Callable[[], None]", check)()
 
 
 @pytest.mark.parametrize("form", ["bin", "txt"])
@@ -176,4 +177,4 @@ def test_damaged_colmap_models(small_room, tmp_path, form):
         finally:
             file.write_bytes(original)
 
-    check()
+    cast("Callable[[], None]", check)()

@@ -87,7 +87,7 @@ def _wait(process: subprocess.Popen) -> int:
     def interrupt(number: int, frame: object) -> None:
         nonlocal interrupted
         interrupted = True
-        if not sys.stdin.isatty():  # from a terminal Ctrl-C has reached Snakemake too
+        if not os.isatty(0):  # from a terminal Ctrl-C has reached Snakemake too
             process.send_signal(signal.SIGINT)
 
     signal.signal(signal.SIGINT, interrupt)

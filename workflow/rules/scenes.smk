@@ -46,6 +46,8 @@ rule features:
     benchmark:
         f"{RESULTS}/benchmarks/features/{{scene}}.tsv"
     threads: SETTINGS.compute.threads
+    resources:
+        gpu=WIRING.encoder_gpu,
     params:
         encoder=STUDY.encoder,
     message:

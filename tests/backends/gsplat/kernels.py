@@ -16,7 +16,7 @@ ALPHA_MIN = 1 / 255
 
 def replace(monkeypatch) -> None:
     """Exchanges every kernel that an unpacked pinhole rendering and the two strategies call."""
-    from gsplat import rendering
+    from gsplat import rendering  # pyright: ignore[reportAttributeAccessIssue] - as in backends/gsplat/__init__.py
     from gsplat.cuda import _torch_impl
     from gsplat.strategy import ops
 

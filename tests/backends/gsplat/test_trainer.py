@@ -78,6 +78,22 @@ def test_growth_ends_where_there_are_enough(take_views, tmp_path):
     assert known(train(views, tmp_path / "c", **options).n_primitives) > 200
 
 
+@pytest.mark.parametrize("source", ["auto", "scene", "sweep", "rays", "random"])
+def test_it_starts_where_any_other_backend_can(take_views, tmp_path, source):
+    trained = train(take_views(width=24), tmp_path / "m", steps=2, points=source, drawn_points=60)
+    assert (trained.seeding.points, trained.seeding.count > 0) == (source, True)
+    assert trained.n_primitives == trained.seeding.count
+    limited = train(take_views(width=24), tmp_path / "n", steps=2, points=source, drawn_points=60, gaussians=40)
+    assert limited.seeding.count <= 40
+
+
+def test_points_that_are_guessed_start_as_faint_as_in_splat():
+    place = np.eye(3)
+    starts = [Start(place, np.ones((3, 3)), kind) for kind in ("scene", "guessed", "ray", "random")]
+    opacity = 1 / (1 + np.exp(-gaussians_of.initial(starts, "mcmc", 0, 1.0).opacities.reshape(4, 3)[:, 0]))
+    assert np.allclose(opacity, [0.5, 0.1, 0.03, 0.5])
+
+
 def test_opacities_are_reset_on_schedule(take_views):
     """gsplat 1.5.3 alone never resets them."""
     views = take_views(width=24)
