@@ -1,7 +1,9 @@
 """Command lines with {placeholders}, run as lists and never through a shell."""
 
+import itertools
 import socket
 import string
+from pathlib import Path
 from typing import Any
 
 from ..common.errors import UserError, nearest
@@ -33,6 +35,13 @@ def places_in(command: list[str]) -> set[str]:
 def filled(command: list[str], values: dict[str, Any]) -> list[str]:
     """The command line with the values in the places of their names."""
     return [part.format(**values) for part in command]
+
+
+def program(command: list[str]) -> str:
+    """The program that a command line starts: behind `env` and the variables that it sets, where it begins so."""
+    if Path(command[0]).name != "env":
+        return command[0]
+    return next(itertools.dropwhile(lambda part: "=" in part, command[1:]), command[0])
 
 
 def free_port() -> int:

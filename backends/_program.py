@@ -11,6 +11,7 @@ from pathlib import Path
 from ..common.errors import UserError
 from ..common.files import sha256_file
 from ..scenes.image_files import is_file
+from ._command_line import program
 
 LONGEST_NAME = 4096  # of a path; more is a script in the command line
 SECONDS = 60.0
@@ -56,10 +57,10 @@ def files_sha256(command: list[str]) -> str:
 
 
 def named_files(command: list[str]) -> list[Path]:
-    """Programs and scripts that a command line names, each once."""
+    """Programs and scripts that a command line names, each once; `env` before them is none."""
     files = []
-    for number, part in enumerate(dict.fromkeys(command)):
-        # Only the first word is looked for on PATH: "black" may be a colour, and a program too.
+    for number, part in enumerate(dict.fromkeys(command[command.index(program(command)) :] if command else [])):
+        # Only the program is looked for on PATH: "black" may be a colour, and a program too.
         found = shutil.which(part) if number == 0 else part if is_file(Path(part)) else None
         if found:
             files.append(Path(found))

@@ -16,7 +16,16 @@ from ..common.files import read_json, write_json
 from ..common.settings import Command, Settings
 from ..scenes.types import Cameras
 from . import _process, _subset
-from ._command_line import OUTPUT_PLACES, RENDER_PLACES, TRAIN_PLACES, check_places, filled, free_port, places_in
+from ._command_line import (
+    OUTPUT_PLACES,
+    RENDER_PLACES,
+    TRAIN_PLACES,
+    check_places,
+    filled,
+    free_port,
+    places_in,
+    program,
+)
 from ._ply_render import ply_renderer, render_ply  # no source: training does not draw
 from ._points import SOURCES, WITHOUT, Wanted, knowing, starting_points
 from ._program import files_sha256, program_version
@@ -97,8 +106,8 @@ class External:
 
     def available(self) -> str | None:
         for part, command in (("train", self.entry.train), ("render", self.entry.render)):
-            if command and shutil.which(command[0]) is None:
-                return f"'{command[0]}', which its `{part}` command starts, is not installed or not on PATH"
+            if command and shutil.which(program(command)) is None:
+                return f"'{program(command)}', which its `{part}` command starts, is not installed or not on PATH"
         return None
 
     def version(self) -> str:
@@ -136,7 +145,7 @@ class External:
         points, seeding = self._points(data, str(options["points"]), seed)
         _subset.write(out / SCENE, self.entry.format, data.cameras, data.images, points)
         began = time.perf_counter()
-        report.progress(0, None, f"running {self.entry.train[0]}, which writes {LOG}")
+        report.progress(0, None, f"running {program(self.entry.train)}, which writes {LOG}")
         command = filled(self.entry.train, values)
         usage = _process.run(command, out, out / LOG, self._what, self.entry.timeout or None)
         seconds = time.perf_counter() - began
@@ -164,7 +173,10 @@ class External:
             return
         with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
             place = Path(folder).resolve()
-            _subset.write(place / "cameras", self.entry.format, cameras, None)
+            # A lone camera is written twice: nerfstudio names renders by their place below the folder that all
+            # pictures have in common, and one alone by nothing.
+            drawn = cameras if len(cameras) > 1 else cameras[[0, 0]]
+            _subset.write(place / "cameras", self.entry.format, drawn, None)
             (place / "renders").mkdir()
             values = {
                 **read_json(model / RECORD, "training record"),

@@ -1,30 +1,62 @@
-"""Nerfstudio's own code from PyPI, without the packages that reading a capture does not use."""
+"""Nerfstudio's own code from PyPI, without the packages that reading a capture or a configuration does not use."""
 
 import importlib
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import ModuleType
+from typing import Any
 from unittest.mock import MagicMock
 
 import pytest
 
-UNUSED = ("cv2", "viser", "viser.transforms", "appdirs", "newrawpy", "torch.utils.tensorboard")
+from viewbench.common.torchvision_cpu import import_torchvision
+
+READING = ("cv2", "viser", "viser.transforms", "appdirs", "newrawpy", "torch.utils.tensorboard")
+CONFIGURING = (
+    *READING,
+    *("fpsample", "nerfacc", "pathos", "pathos.helpers", "pyquaternion", "pytorch_msssim", "tensorly", "tyro"),
+)
+VIEWERS = (
+    *("nerfstudio.viewer.viewer", "nerfstudio.viewer.viewer_elements"),
+    *("nerfstudio.viewer_legacy.server.viewer_state", "nerfstudio.viewer_legacy.server.viewer_elements"),
+)
 
 
 @contextmanager
 def dataparser(name: str) -> Iterator[ModuleType]:
-    """A module of nerfstudio.data.dataparsers; what it imports and does not use is stood in for where it is missing."""
-    pytest.importorskip("nerfstudio", reason="nerfstudio is not installed (make dev installs its code alone)")
-    stood_in = []
-    for module in UNUSED:
-        try:
-            importlib.import_module(module)
-        except ImportError:
-            stood_in.append(module)
-            sys.modules[module] = MagicMock()
-    try:
+    """A module of nerfstudio.data.dataparsers."""
+    with _without(READING):
         yield importlib.import_module(f"nerfstudio.data.dataparsers.{name}")
+
+
+@contextmanager
+def methods() -> Iterator[dict[str, Any]]:
+    """Configurations by the names that `ns-train` knows them by, before its command line changes them."""
+    import_torchvision()
+    with _without(CONFIGURING, VIEWERS), warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # of newer releases of torch than it knows
+        yield importlib.import_module("nerfstudio.configs.method_configs").method_configs
+
+
+@contextmanager
+def _without(unused: tuple[str, ...], never: tuple[str, ...] = ()) -> Iterator[None]:
+    """What nerfstudio imports and does not use here is stood in for: `unused` where it is missing, `never` always."""
+    pytest.importorskip("nerfstudio", reason="nerfstudio is not installed (make dev installs its code alone)")
+    stood_in = [*never, *(module for module in unused if not _importable(module))]
+    for module in stood_in:
+        sys.modules[module] = MagicMock()
+    try:
+        yield
     finally:
         for module in stood_in:
             del sys.modules[module]
+
+
+def _importable(module: str) -> bool:
+    try:
+        importlib.import_module(module)
+    except ImportError:
+        return False
+    return True

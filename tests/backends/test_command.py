@@ -160,6 +160,12 @@ def test_an_absent_program_is_unavailable_and_says_which():
     assert load().available() is None
 
 
+def test_a_program_may_stand_behind_env_and_its_variables():
+    assert load(train=["env", "A=1", "B=2", sys.executable, "A=3"]).available() is None
+    assert "'no-such-trainer'" in load(train=["/usr/bin/env", "A=1", "no-such-trainer"]).available()
+    assert load(train=["env", "A=1"]).available() is None, "env alone is a program too"
+
+
 def test_version_is_what_the_program_says_or_a_hash_of_its_files(tmp_path):
     assert load(version=python("print('tool 1.2')")).version() == "tool 1.2"
     script = tmp_path / "tool.py"
@@ -188,6 +194,22 @@ def test_renders_are_looked_for_where_output_says(take_views, tmp_path):
     with pytest.raises(UserError, match=r"wrote 0 of 3 renders, '00000_rgb\.png' is not there"):
         list(load(output="sub/{name}_rgb.png").render(tmp_path / "m", views.cameras))
     assert len(list(load(output="{index:05d}.png").render(tmp_path / "m", views.cameras))) == 3
+
+
+def test_a_camera_alone_is_rendered_by_a_program_that_names_renders_below_their_common_folder(take_views, tmp_path):
+    """As nerfstudio does: `ns-render dataset` writes one picture to test/rgb.png and two to test/rgb/NAME.png."""
+    code = (
+        "import os, pathlib, shutil, sys; files = sorted(pathlib.Path(sys.argv[1], 'images').iterdir())\n"
+        "root = os.path.commonpath(files)\n"
+        "for file in files:\n"
+        "    place = (pathlib.Path(sys.argv[2], 'rgb') / file.relative_to(root)).with_suffix('.png')\n"
+        "    place.parent.mkdir(parents=True, exist_ok=True); shutil.copy(file, place)"
+    )
+    views = take_views()
+    backend = load(render=[*python(code), "{cameras}", "{renders}"], output="rgb/{name}.png")
+    train(backend, views, tmp_path / "m")
+    for count in (1, 2):
+        assert len(list(backend.render(tmp_path / "m", views.cameras[:count]))) == count
 
 
 def test_renders_in_the_model_folder_are_this_run_s(take_views, tmp_path):
@@ -227,22 +249,28 @@ def test_a_ply_of_gaussians_needs_no_renderer(take_views, tmp_path, degree):
     assert image.max() == pytest.approx(0.5 + 0.2820948, abs=0.02), "the constant band of one, on black"
 
 
-def examples() -> dict:
+def example_text() -> str:
     """The sections [command.NAME] that environment.toml has as comments."""
     lines = (PACKAGE / "environment.toml").read_text(encoding="utf-8").splitlines()
     start = next(number for number, line in enumerate(lines) if line.startswith("# [command."))
     text = [line.removeprefix("# ") for line in lines[start:]]
     written = [line for line in text if re.match(r"""\[command\.|\w+ = |\s*"|#?$""", line)]
-    return tomllib.loads("\n".join(written))["command"]
+    return "\n".join(written)
+
+
+def examples() -> dict:
+    """These sections by their names."""
+    return tomllib.loads(example_text())["command"]
 
 
 def test_the_examples_that_ship_are_well_formed():
     commands = {name: Command(**section) for name, section in examples().items()}
     settings = settings_with(**commands)
-    assert set(settings.command) == {"3dgs", "splatfacto", "opensplat"}
+    assert set(settings.command) == {"3dgs", "splatfacto", "nerfacto", "opensplat"}
     for name in settings.command:
         backend = _registry.load(f"command:{name}", settings)
-        assert (backend.CAPABILITIES.device, backend.CAPABILITIES.iterations) == ("cuda", True)
+        device = "cpu" if name == "nerfacto" else "cuda"
+        assert (backend.CAPABILITIES.device, backend.CAPABILITIES.iterations) == (device, True)
 
 
 def test_the_section_is_read_from_environment_toml(tmp_path):

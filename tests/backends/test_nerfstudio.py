@@ -1,10 +1,15 @@
-"""What nerfstudio's own reader makes of the scenes that its example in environment.toml gets."""
+"""What nerfstudio's own reader and configurations make of its examples in environment.toml.
 
+`make external` has its command line read them, and trains with the one that needs no GPU.
+"""
+
+import copy
 import dataclasses
 import json
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -12,7 +17,7 @@ import pytest
 from plyfile import PlyData
 
 from tests.backends.test_command import examples
-from tests.nerfstudio_code import dataparser
+from tests.nerfstudio_code import dataparser, methods
 from viewbench.backends import _subset
 from viewbench.common.settings import load as load_settings
 from viewbench.scenes.images import load_images
@@ -23,6 +28,12 @@ from viewbench.scenes.load import open_scene
 def reader():
     with dataparser("nerfstudio_dataparser") as module:
         yield module
+
+
+@pytest.fixture(scope="module")
+def known():
+    with methods() as configurations:
+        yield configurations
 
 
 def options_of(module, command: list[str]) -> dict:
@@ -83,3 +94,56 @@ def test_cameras_to_render_come_back_in_their_order(reader, small_room, tmp_path
     found = read(reader, tmp_path, "test")
     assert np.allclose(found.cameras.camera_to_worlds.numpy(), cameras.c2w[:, :3], atol=1e-5)
     assert json.loads((tmp_path / "transforms.json").read_text())["camera_model"] == "PINHOLE"
+
+
+@pytest.mark.parametrize("name", ["splatfacto", "nerfacto"])
+def test_flags_of_the_examples_are_fields_of_the_method(known, name):
+    """Each names a field that is there and gives it a value of its kind; the other fields are the method's own."""
+    command = examples()[name]["train"]
+    before, config = known[command[1]], copy.deepcopy(known[command[1]])
+    for flag, values in flags_of(command[2 : command.index("nerfstudio-data")]):
+        owner, field = field_of(config, flag)
+        setattr(owner, field, like(getattr(owner, field), values))
+    assert config.get_base_dir() == Path("cell", name, "run")
+    assert config.pipeline.model.camera_optimizer.mode == "off"
+    assert (config.machine.seed, config.max_num_iterations) == ("{seed}", "{iterations}")
+    assert config.is_tensorboard_enabled(), "another would open a viewer, and wait in it"
+    assert not config.steps_per_eval_batch + config.steps_per_eval_image + config.steps_per_eval_all_images
+    if name == "splatfacto":
+        assert config.pipeline.datamanager.train_cameras_sampling_seed == "{seed}"
+        assert (config.pipeline.model.background_color, config.pipeline.model.num_downscales) == ("black", 0)
+    else:
+        assert (config.pipeline.model.implementation, config.machine.device_type) == ("torch", "cpu")
+        assert not config.pipeline.model.use_appearance_embedding
+        assert before.pipeline.model.use_appearance_embedding
+
+
+def flags_of(words: list[str]) -> list[tuple[str, list[str]]]:
+    """Flags and the values behind each."""
+    found: list[tuple[str, list[str]]] = []
+    for word in words:
+        if word.startswith("--"):
+            found.append((word, []))
+        else:
+            found[-1][1].append(word)
+    return found
+
+
+def field_of(config: Any, flag: str) -> tuple[Any, str]:
+    """The object and the name of its field that a flag sets."""
+    *path, field = flag.removeprefix("--").replace("-", "_").split(".")
+    for part in path:
+        config = getattr(config, part)
+    assert field in {item.name for item in dataclasses.fields(config)}, f"nerfstudio has no {flag}"
+    return config, field
+
+
+def like(default: Any, values: list[str]) -> Any:
+    """Words as a value of the same kind as the one that they replace; placeholders stay."""
+    if values[0].startswith("{"):
+        return values[0]
+    if isinstance(default, bool):
+        return {"True": True, "False": False}[values[0]]
+    if isinstance(default, tuple):
+        return tuple(int(value) for value in values)
+    return int(values[0]) if isinstance(default, int) else values[0]

@@ -23,6 +23,12 @@ def test_a_console_script_has_the_version_of_its_package():
     assert version.startswith(f"pytest {pytest.__version__}, python {sys.version.split()[0]} with packages ")
 
 
+def test_variables_before_a_program_do_not_change_what_it_is():
+    command = [sys.executable, str(Path(__file__))]
+    assert named_files(["env", "A=/bin/sh", *command]) == named_files(command)
+    assert named_files([]) == []
+
+
 def test_packages_beside_a_python_program_are_part_of_it(tmp_path):
     """A rasteriser that is built again changes models, and no file that the command line names."""
     python = tmp_path / "env" / "bin" / "python"
