@@ -167,8 +167,10 @@ def _probe(scene: Scene, width: int | None) -> Probe:
 
 
 def _replace_model(model: Path, out: Path) -> None:
-    """Moves the files of a model to `out`, in place of all those of the one that was there."""
-    (out / "train.json").unlink(missing_ok=True)  # its model is about to go
+    """Moves the files of a model to `out`, in place of all those of the one that was there, and of its scores."""
+    for name in ("train.json", "metrics.json"):  # their model is about to go
+        (out / name).unlink(missing_ok=True)
+    shutil.rmtree(out / "renders", ignore_errors=True)
     names = sorted(file.name for file in model.iterdir())
     before = read_json(out / LEFT, "list of files") if (out / LEFT).is_file() else []
     for name in {*names, *(name for name in before if isinstance(name, str) and Path(name).name == name)}:

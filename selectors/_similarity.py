@@ -145,7 +145,7 @@ def describe(similarity: Similarity, alpha: float, beta: float, factors: Sequenc
     given: dict[str, float] = dict(zip(FACTORS, (alpha, beta, 1 - alpha - beta), strict=True))
     if all(given[name] <= 1e-12 for name in missing):
         return {}
-    why = "no image features" if "sem" in missing and "sem" in factors else "as asked"
+    why = "no image features" if "sem" in missing and "sem" in factors else "those in use"
     return {
         "weights": {name: round(weight, 6) for name, weight in similarity.weights.items()},
         "factors": f"{', '.join(similarity.weights)} only ({why}); their weights were divided by their sum",

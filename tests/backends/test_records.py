@@ -92,6 +92,15 @@ def test_a_killed_run_is_taken_up_for_the_same_and_nothing_else(asked, tmp_path,
     assert not (work / "model" / "snapshot.npz").exists()
 
 
+def test_a_new_model_has_no_score_of_the_old_one(small_room, tmp_path):
+    scene, _, _ = trained(small_room, tmp_path)
+    _evaluate.evaluate(tmp_path, scene, tmp_path, settings=SETTINGS)
+    assert (tmp_path / "metrics.json").is_file()
+    trained(small_room, tmp_path, seed=1)
+    assert not (tmp_path / "metrics.json").exists()
+    assert not (tmp_path / "renders").exists()
+
+
 def test_another_choice_of_as_many_views_is_another_run(small_room, tmp_path):
     first = trained(small_room, tmp_path / "a")[2]
     scene = open_scene(str(small_room), SETTINGS)

@@ -90,7 +90,7 @@ def test_without_features_the_weights_are_renormalised_and_the_record_says_so(se
     assert "no image features" in record["notes"]["factors"]
     same = run(selector, parameters={"factors": ["pos", "ang"]})
     assert same["indices"] == record["indices"]
-    assert "as asked" in same["notes"]["factors"]
+    assert "those in use" in same["notes"]["factors"]
     assert "weights" not in run(selector).get("notes", {})
 
 

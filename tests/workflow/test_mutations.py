@@ -138,6 +138,7 @@ def weights(clone):
 
 
 OURS = {"warm": 1, "train": 2, "evaluate": 2, **TABLES}  # the cells of one backend
+TRAININGS = {"warm": 3, "train": 6, "evaluate": 6, **TABLES}
 OF_ANOTHER = {"study": 1, "select": 1, "train": 3, "evaluate": 3, **TABLES}
 OF_MAXMIN = {"select": 1, "train": 3, "evaluate": 3, **TABLES}
 MUTATIONS = {
@@ -190,7 +191,8 @@ MUTATIONS = {
     "the reader": (source("scenes/formats/transforms.py"), EVERYTHING),
     "the reader of another format": (source("scenes/formats/tum_rgbd.py"), {}),
     "our trainer, which draws for one program": (source("backends/splat/raster.py"), {**OURS, "evaluate": 4}),
-    "how kernels are compiled": (source("common/kernels.py"), {**OURS, "evaluate": 4}),
+    "where any trainer may start": (source("backends/_points/swept.py"), TRAININGS),
+    "how kernels are compiled, the sweep's among them": (source("common/kernels.py"), TRAININGS),
     "a trainer of no cell, which may draw": (source("backends/gsplat/renderer.py"), {"evaluate": 2, **TABLES}),
     "what draws a PLY": (source("backends/_ply_render.py"), {"evaluate": 2, **TABLES}),
     "what runs programs": (source("backends/_process.py"), {"warm": 2, "train": 4, "evaluate": 4, **TABLES}),

@@ -78,6 +78,7 @@ def test_one_line_chooses_the_start_of_every_trainer_that_can_be_told(load):
         ({"selectors": [{"selector": "maxmin", "parameters": {"sigma": "wide"}}]}, "expected a number"),
         ({"backends": [{"backend": "splat", "options": {"point": "sweep"}}]}, "did you mean 'points'"),
         ({"backends": ["command:nobody"]}, "has no [command.nobody]"),
+        ({"points": "swep"}, "cannot start from points 'swep'; did you mean 'sweep'?"),
     ],
 )
 def test_parameters_and_options_are_checked_before_anything_runs(load, changes, words):

@@ -84,6 +84,8 @@ def command(**given: Any) -> None:
         title = f"{scene.name}: {count} of {n} views by {given['selector']}"
         cameras = scene.train.cameras
         plot(given["plot"], title, cameras.positions, cameras.forward, np.asarray(record["indices"]))
+    if given["out"] and not given["dry_run"]:
+        click.echo(f"viewbench: {count} of {n} views are in {given['out']}, in the order chosen:", err=True)
     if given["dry_run"] or not given["selection"]:
         for name in record["names"]:
             click.echo(name)
