@@ -93,7 +93,7 @@ def check_selection(selection: dict[str, Any], scene: Scene, scene_sha256: str) 
         raise UserError(
             f"the selection was made on scene '{selection.get('scene')}' with holdout "
             f"'{selection.get('holdout')}' and hash {str(made_on)[:12]}, but '{scene.name}' has holdout "
-            f"'{scene.holdout}' and hash {scene_sha256[:12]}; select again"
+            f"'{scene.holdout}' and hash {scene_sha256[:12]}; give the capture that it was made of, or select again"
         )
     if n_views != len(scene.train):
         raise UserError(
