@@ -2,10 +2,11 @@
 
     python -m tests.external_trainer FOLDER [--iterations N]          (or: make external)
 
-makes FOLDER/nerfstudio, a virtual environment (4 GB; kept for the next time), trains on 20 views of the generated room
+makes FOLDER/nerfstudio, a virtual environment (4 GB; kept for the next time), trains on 80 views of the generated room
 with the example of environment.toml, scores the test views, and checks that renders are where their cameras are. It
-also has nerfstudio read the command lines of the other example, whose rasteriser needs CUDA. It takes a quarter of an
-hour after the installation, and is no part of `make test`. Raises AssertionError on the first thing that is wrong.
+also has nerfstudio read the command lines of the other example, whose rasteriser needs CUDA. It takes ten minutes to
+install and six to run on two quiet cores, and is no part of `make test`. Raises AssertionError on the first thing that
+is wrong. A run gave 17.99 dB on test views and 20.57 on training views, where the mean colour has 14.53 on the former.
 """
 
 import argparse
@@ -32,7 +33,7 @@ from viewbench.scenes.load import open_scene
 WANTED = (("torch==2.13.0", "torchvision==0.28.0"), ("nerfstudio==1.1.5",))
 ROOM = "room_human"
 WIDTH = 64
-VIEWS = 20
+VIEWS = 80
 
 # Where the index has a CPU build of torch and a CUDA build of torchvision, torchvision misses two operators at its
 # import, which nothing here calls.
@@ -173,7 +174,7 @@ def check_renders(place: Place, settings: Settings) -> str:
     found = f"test views {test:.2f} dB, training views {own:.2f} dB, the mean colour {flat:.2f} dB on test views"
     assert np.array_equal(table.argmax(axis=1), np.arange(VIEWS)), f"renders of other cameras' views: {found}"
     assert own > flat + 4, found
-    assert test > flat + 1, found
+    assert test > flat + 2, found
     assert psnr_db(alone, tests[0]) > flat - 3, f"a view rendered alone is another: {psnr_db(alone, tests[0]):.2f} dB"
     return found
 
