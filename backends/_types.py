@@ -27,6 +27,10 @@ import numpy as np
 
 from ..scenes.types import Cameras, Points
 
+# Where a training may start: see _points. A program may do without any points too.
+SOURCES = ("auto", "scene", "selected", "sweep", "rays", "random")
+WITHOUT = "none"
+
 # Options that mean the same for every backend that has them, so that a line of a study holds for all: where a training
 # starts (a source of _points; str), how many primitives there may be (int), the degree of the spherical harmonics
 # (int), and the grey level behind everything, from 0 for black to 1 for white (float).

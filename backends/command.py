@@ -27,10 +27,10 @@ from ._command_line import (
     program,
 )
 from ._ply_render import ply_renderer, render_ply  # no source: training does not draw
-from ._points import SOURCES, WITHOUT, Wanted, knowing, starting_points
+from ._points import Wanted, knowing, starting_points
 from ._program import files_sha256, program_version
 from ._surroundings import surroundings
-from ._types import Budget, Capabilities, Report, Seeding, Trained, TrainingSet
+from ._types import SOURCES, WITHOUT, Budget, Capabilities, Report, Seeding, Trained, TrainingSet
 
 LOG = "command.log"
 SCENE = "scene"  # the subset, inside the model folder while the program trains

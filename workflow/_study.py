@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..backends import _registry
-from ..backends._points import SOURCES, WITHOUT
 from ..backends._train import all_options
-from ..backends._types import SHARED
+from ..backends._types import SHARED, SOURCES, WITHOUT
 from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import Settings

@@ -12,14 +12,12 @@ import numpy as np
 
 from ...common.errors import UserError, nearest
 from .._surroundings import Surroundings
-from .._types import Seeding, TrainingSet
+from .._types import SOURCES, Seeding, TrainingSet
 from .drawn import along_rays, random_box
 from .scene import scene_points
 from .start import FEWEST, KINDS, Start
 from .swept import swept
 
-SOURCES = ("auto", "scene", "selected", "sweep", "rays", "random")
-WITHOUT = "none"  # of programs: no points at all
 BLIND = ("sweep", "rays", "random")  # for scenes without points: a start from these knows none of them
 DRAWN = 100_000  # points where nothing else says how many, as the 3DGS authors draw where a scene has none
 SWEEP = 0.3  # share of all that a sweep gives where the scene has points too

@@ -5,8 +5,9 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from viewbench.backends._points import SOURCES, SWEEP, Wanted, knowing, starting_points
+from viewbench.backends._points import SWEEP, Wanted, knowing, starting_points
 from viewbench.backends._surroundings import surroundings
+from viewbench.backends._types import SOURCES
 from viewbench.common.errors import UserError
 
 RNG = np.random.default_rng(0)
