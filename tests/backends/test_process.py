@@ -75,7 +75,8 @@ def test_time_out_takes_the_whole_group(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_the_program_does_not_outlive_its_caller(tmp_path, number):
     code = (
-        "import sys; from pathlib import Path; from viewbench.backends import _process\n"
+        "import signal, sys; from pathlib import Path; from viewbench.backends import _process\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell ignores it in what it runs behind itself
         "inner = 'import os, time; print(os.getpid(), flush=True); time.sleep(60)'\n"
         f"_process.run([sys.executable, '-c', inner], Path({str(tmp_path)!r}), Path({str(tmp_path)!r}) / 'log', 'x')\n"
     )
