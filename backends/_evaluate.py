@@ -47,9 +47,8 @@ def evaluate(
     scene_hash = scene_sha256(scene)
     check_model(model, train, scene, scene_hash)
     backend = _registry.load(train["backend"], settings)
-    if backend.CAPABILITIES.device == "cuda":
-        gpu.hold(_registry.device_of(settings))
-    elif "backends.gsplat" in getattr(backend, "RENDERERS", ()):
+    _registry.hold_gpu(backend, settings)
+    if "backends.gsplat" in getattr(backend, "RENDERERS", ()):
         gpu.hold(settings.compute.device)  # whose rasteriser draws where there is a GPU
     reason = backend.available()
     if reason:

@@ -3,17 +3,17 @@
 import contextlib
 import os
 import shutil
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ..common import gpu
+
 EVERY_S = 0.2  # between looks at the memory of a running program
 JOIN_S = 0.05
 WATCHER = "memory"  # the thread that looks
 GPU_EVERY_S = 1.0  # nvidia-smi takes a tenth of a second itself
-QUERY = ("nvidia-smi", "--query-compute-apps=pid,used_memory", "--format=csv,noheader,nounits")
 
 
 @dataclass
@@ -59,7 +59,7 @@ def watched(pid: int) -> Iterator[Usage]:
 def _watch(pid: int, usage: Usage, done: threading.Event) -> None:
     import psutil
 
-    has_gpu = shutil.which(QUERY[0]) is not None
+    has_gpu = shutil.which(gpu.SMI) is not None
     rounds = 0
     while True:
         with contextlib.suppress(psutil.Error):
@@ -81,9 +81,8 @@ def _watch(pid: int, usage: Usage, done: threading.Event) -> None:
 def gpu_bytes(pids: set[int]) -> int | None:
     """GPU memory of these processes now, in bytes; None where nvidia-smi does not name them or cannot say."""
     try:
-        listed = subprocess.run(QUERY, capture_output=True, text=True, timeout=10, check=True).stdout
-        rows = [line.split(",") for line in listed.splitlines() if "," in line]
+        rows = gpu.asked("--query-compute-apps=pid,used_memory") or ()
         ours = [int(float(used)) << 20 for pid, used in rows if int(pid) in pids]  # it counts in MiB
-        return sum(ours) if ours else None  # in a container it may know the processes by other numbers
-    except (OSError, subprocess.SubprocessError, ValueError):
+    except ValueError:
         return None
+    return sum(ours) if ours else None  # in a container it may know the processes by other numbers

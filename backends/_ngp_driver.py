@@ -70,9 +70,9 @@ def configurations(checkout: Path) -> dict[str, Path]:
     return {file.stem: file for file in sorted((checkout / "configs" / "nerf").glob("*.json"))}
 
 
-def testbed_of(checkout: Path) -> Any:
+def testbed_of(ngp: Any, checkout: Path) -> Any:
     """A fresh testbed that finds what belongs to it."""
-    testbed = import_pyngp(checkout).Testbed()
+    testbed = ngp.Testbed()
     testbed.root_dir = str(checkout)
     return testbed
 
@@ -81,11 +81,11 @@ def train(
     checkout: Path, scene: Path, snapshot: Path, record: Path, network: str, steps: int, seconds: float, near: float
 ) -> None:
     """Trains until `steps` or `seconds` (0: no such limit), saves the network, and notes steps, seconds and losses."""
-    testbed = testbed_of(checkout)
+    ngp = import_pyngp(checkout)
+    testbed = testbed_of(ngp, checkout)
     testbed.load_training_data(str(scene))
-    modes = getattr(import_pyngp(checkout), "TrainMode", None)
-    if modes is not None:  # older checkouts have but this one
-        testbed.nerf.training.train_mode = modes.Nerf
+    if hasattr(ngp, "TrainMode"):  # older checkouts have but this one
+        testbed.nerf.training.train_mode = ngp.TrainMode.Nerf
     testbed.reload_network_from_file(str(configurations(checkout)[network]))
     if near >= 0:
         testbed.nerf.training.near_distance = near
@@ -112,7 +112,7 @@ def render(checkout: Path, snapshot: Path, cameras: Path, images: Path, samples:
     """Writes an (H, W, 3) float32 array in sRGB for every frame of the transforms file `cameras`, in its order."""
     import numpy as np
 
-    testbed = testbed_of(checkout)
+    testbed = testbed_of(import_pyngp(checkout), checkout)
     testbed.load_snapshot(str(snapshot))
     testbed.shall_train = False
     testbed.background_color = [0.0, 0.0, 0.0, 1.0]

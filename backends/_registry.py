@@ -3,7 +3,7 @@
 from types import ModuleType
 from typing import Any
 
-from ..common import plugins
+from ..common import gpu, plugins
 from ..common.settings import Settings
 
 
@@ -27,9 +27,14 @@ def load(name: str, settings: Settings) -> ModuleType | Any:
     return configure(argument, settings) if configure else module
 
 
-def device_of(settings: Settings) -> str:
-    """The device for a backend that needs a GPU: a program of its own takes one whatever is said of ours."""
-    return "cuda" if settings.compute.device == "cpu" else settings.compute.device
+def hold_gpu(backend: Any, settings: Settings) -> gpu.Lease | None:
+    """Takes a device for a backend that needs one; comes before it is asked whether it is available.
+
+    A program of its own takes one whatever is said of ours.
+    """
+    if backend.CAPABILITIES.device != "cuda":
+        return None
+    return gpu.hold("cuda" if settings.compute.device == "cpu" else settings.compute.device)
 
 
 def configuration_of(backend: Any) -> dict[str, dict[str, Any]]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..common import gpu, plugins
+from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.files import read_json, sealed, sha256_folder, write_json
 from ..common.provenance import commit, machine
@@ -28,7 +28,7 @@ from ..selectors._selection import check_selection, selection_sha256
 from . import _registry
 from ._memory import peak_rss_bytes
 from ._psnr import psnr_db
-from ._types import Budget, Job, Probe, Report, Trained, TrainingSet
+from ._types import SOURCES, WITHOUT, Budget, Job, Probe, Report, Trained, TrainingSet
 
 OURS = ("selection.json", "train.json", "metrics.json", "renders")  # beside a model: no file of it may be called so
 LEFT = ".files.json"  # names of the model's files, for the training that replaces it
@@ -52,7 +52,7 @@ def train(
     scene, and whatever the backend refuses.
     """
     backend = _registry.load(job.backend, settings)
-    lease = gpu.hold(_registry.device_of(settings)) if backend.CAPABILITIES.device == "cuda" else None
+    lease = _registry.hold_gpu(backend, settings)
     reason = backend.available()
     if reason:
         raise UserError(f"backend '{job.backend}' is not available: {reason}")
@@ -127,6 +127,13 @@ def all_options(backend: str, known: dict[str, Any], given: dict[str, Any]) -> d
             raise UserError(
                 f"backend '{backend}': option '{name}' is {value!r}, expected something like {known[name]!r}"
             )
+    points = given.get("points")
+    sources = (*SOURCES, WITHOUT) if backend.startswith("command:") else SOURCES
+    if points is not None and points not in sources:
+        raise UserError(
+            f"backend '{backend}' cannot start from points '{points}'{nearest(str(points), sources)} "
+            f"(known: {', '.join(sources)})"
+        )
     return {**known, **given}
 
 

@@ -28,6 +28,7 @@ from ._command_line import (
 )
 from ._ply_render import ply_renderer, render_ply  # no source: training does not draw
 from ._points import Wanted, knowing, starting_points
+from ._points.start import joined
 from ._program import files_sha256, program_version
 from ._surroundings import surroundings
 from ._types import SOURCES, WITHOUT, Budget, Capabilities, Report, Seeding, Trained, TrainingSet
@@ -213,8 +214,7 @@ class External:
         data = knowing(data, source)
         around = surroundings(data.training, data.points)
         starts, seeding = starting_points(data, Wanted(source), around, np.random.default_rng(seed))
-        xyz = np.concatenate([start.points for start in starts])
-        colours = np.concatenate([start.colours for start in starts])
+        xyz, colours = joined(starts)
         return (xyz, np.round(255 * colours).astype(np.uint8)), seeding
 
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from .errors import UserError
 VISIBLE = "CUDA_VISIBLE_DEVICES"
 FOLDER = "viewbench-gpu"  # in the folder of temporary files: for all users of the machine
 POLL_S = 0.5
+SMI = "nvidia-smi"
 
 
 @dataclass
@@ -28,19 +29,19 @@ class Lease:
     """A device that is this process's among those of viewbench."""
 
     device: str  # as CUDA_VISIBLE_DEVICES names it
+    uuid: str  # as nvidia-smi names it; `device` where that cannot say
     waited_s: float
     others: int  # programs that used the device when it was taken, of whomever
     file: int  # descriptor of the lock; -1 where there are no locks
 
     def record(self) -> dict[str, Any]:
         """What `train.json` says; `shared` is True where another program used the device too, None if nobody knows."""
-        now = _programs(self.device)
+        now = _programs(self.uuid)
         # Where this process is named, every other is somebody's. Where it is not (it may have used none, or go by
         # another number in a container), one may be itself.
         ours = 0 if now is not None and os.getpid() in now else int("torch" in sys.modules)
         shared = None if now is None else self.others > 0 or len(now - {os.getpid()}) > ours
-        said = {key: value for key, value in asdict(self).items() if key in ("device", "waited_s")}
-        return {**said, "shared": shared}
+        return {"device": self.device, "waited_s": self.waited_s, "shared": shared}
 
 
 _held: Lease | None = None
@@ -79,13 +80,14 @@ def hold(wanted: str = "cuda") -> Lease | None:
             raise UserError(f"[compute] device is '{wanted}', and there are {len(names)} devices, cuda:0 and on")
         names = [names[int(number)]]
     os.environ.setdefault("CUDA_DEVICE_ORDER", "PCI_BUS_ID")  # as nvidia-smi counts, by whose numbers locks are named
+    uuids = _identities()
     began, told = time.monotonic(), False
     while True:
         for name in names:
-            file = _lock(name)
+            uuid = uuids.get(name, name)  # one device has one lock, whichever of its names it is called by
+            file = _lock(uuid)
             if file is not None:
-                busy = _programs(name)
-                _held = Lease(name, round(time.monotonic() - began, 1), len(busy or ()), file)
+                _held = Lease(name, uuid, round(time.monotonic() - began, 1), len(_programs(uuid) or ()), file)
                 os.environ[VISIBLE] = name
                 return _held
         if not told:
@@ -94,7 +96,7 @@ def hold(wanted: str = "cuda") -> Lease | None:
         time.sleep(POLL_S)
 
 
-def _lock(device: str) -> int | None:
+def _lock(uuid: str) -> int | None:
     """A descriptor that holds the device's lock; None where another process has it."""
     try:
         import fcntl
@@ -104,7 +106,7 @@ def _lock(device: str) -> int | None:
     with contextlib.suppress(OSError):
         folder.mkdir(exist_ok=True)
         folder.chmod(0o1777)
-    path = folder / _identities().get(device, device).replace("/", "_")
+    path = folder / uuid.replace("/", "_")
     with contextlib.suppress(OSError):
         os.close(os.open(path, os.O_CREAT | os.O_EXCL, 0o666))
         path.chmod(0o666)
@@ -124,23 +126,22 @@ def _lock(device: str) -> int | None:
 
 
 def _identities() -> dict[str, str]:
-    """UUIDs by index: one device has one lock, whichever of its names it is called by."""
-    rows = _asked("--query-gpu=index,uuid")
-    return {row[0]: row[1] for row in rows or () if len(row) == 2}
+    """UUIDs by index."""
+    return {row[0]: row[1] for row in asked("--query-gpu=index,uuid") or () if len(row) == 2}
 
 
-def _programs(device: str) -> set[int] | None:
+def _programs(uuid: str) -> set[int] | None:
     """Numbers of the processes that compute on a device; None where nvidia-smi cannot say."""
-    rows = _asked("--query-compute-apps=gpu_uuid,pid")
+    rows = asked("--query-compute-apps=gpu_uuid,pid")
     if rows is None:
         return None
-    uuid = _identities().get(device, device)
     return {int(row[1]) for row in rows if len(row) == 2 and row[0] == uuid and row[1].isdigit()}
 
 
-def _asked(query: str) -> list[list[str]] | None:
+def asked(query: str) -> list[list[str]] | None:
+    """Rows of what nvidia-smi answers, its numbers without their units; None where there is none, or it fails."""
     try:
-        command = ["nvidia-smi", query, "--format=csv,noheader"]
+        command = [SMI, query, "--format=csv,noheader,nounits"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
     except (OSError, subprocess.SubprocessError):
         return None

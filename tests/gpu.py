@@ -18,9 +18,11 @@ from pathlib import Path
 from viewbench.backends import _registry
 from viewbench.common import gpu
 from viewbench.common import settings as settings_file
+from viewbench.common.cells import cell_folder
 from viewbench.common.files import read_json
 from viewbench.common.settings import PACKAGE
 from viewbench.reports._statistics import summary
+from viewbench.workflow import _study
 from viewbench.workflow.commands import run
 
 SUITE = ("tests/backends/test_every_backend.py", "tests/backends/gsplat")
@@ -64,8 +66,6 @@ def main() -> int:
 
 def _with_instant_ngp(study: str) -> str:
     """A file of the study with instant-ngp among its backends, of the same name."""
-    from viewbench.workflow import _study
-
     text = (_study.STUDIES / f"{study}.yaml").read_text(encoding="utf-8")
     line = "  - {backend: instant-ngp, budget: {iterations: 5000}}\n"
     file = PACKAGE / "results" / f"{study}.yaml"
@@ -86,8 +86,6 @@ def _run(*arguments: str) -> int:
 
 
 def _has_scenes(study: str, settings: settings_file.Settings) -> bool:
-    from viewbench.workflow import _study
-
     def there(name: str) -> bool:
         path = settings.scenes[name].path
         return path.startswith("package:") or Path(settings.data.root, path).is_dir()
@@ -107,10 +105,7 @@ def table(results: Path) -> Iterable[str]:
     for key, rows in groups.items():
         psnr = summary([float(row["psnr_db"]) for row in rows])
         seconds = summary([float(row["train_s"]) for row in rows]).mean
-        folder = results.joinpath(
-            "cells", *(rows[0][name] for name in ("backend", "scene", "selector", "ratio", "seed"))
-        )
-        record = read_json(folder / "train.json")
+        record = read_json(cell_folder(results, rows[0]) / "train.json")
         memory = record["peak_gpu_bytes"]
         spread = "" if psnr.std is None else f" ± {psnr.std:.2f}"
         shared = {True: "yes", False: "no", None: "unknown"}[record["gpu"]["shared"]] if record["gpu"] else ""

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..backends import _registry
 from ..backends._train import all_options
-from ..backends._types import SHARED, SOURCES, WITHOUT
+from ..backends._types import SHARED
 from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import Settings
@@ -188,13 +188,6 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
         if backend.iterations is None and backend.seconds is None:
             raise UserError(f"study '{path}': backend '{backend.name}' has no budget; give iterations or seconds")
         _check_grid(backend, raw, [entry.name for entry in selectors], path)
-        start = backend.options.get("points")
-        known = (*SOURCES, WITHOUT) if backend.backend.startswith("command:") else SOURCES
-        if start is not None and start not in known:
-            raise UserError(
-                f"study '{path}': backend '{backend.name}' cannot start from points '{start}'"
-                f"{nearest(str(start), known)} (known: {', '.join(known)})"
-            )
     for name in SHARED:
         if name in raw and not any(name in backend.options for backend in backends):
             raise UserError(f"study '{path}': '{name}' is set, and none of its backends has it; leave it out")

@@ -7,6 +7,8 @@ import numpy as np
 # scene: of the scene's file; sweep: a depth that a sweep is sure of; guessed: of a pixel beside such; ray: at random on
 # its ray; random: anywhere.
 KINDS = ("scene", "sweep", "guessed", "ray", "random")
+# Opacity of primitives at points whose depth is guessed: almost transparent, so that they fade where it is wrong.
+FAINT = {"guessed": 0.1, "ray": 0.03}
 FEWEST = 500  # scene points, or sure depths, that are worth starting from
 
 
@@ -20,3 +22,8 @@ class Start:
 
     def __len__(self) -> int:
         return len(self.points)
+
+
+def joined(starts: list[Start]) -> tuple[np.ndarray, np.ndarray]:
+    """(P, 3) positions and (P, 3) colours of all."""
+    return np.concatenate([start.points for start in starts]), np.concatenate([start.colours for start in starts])

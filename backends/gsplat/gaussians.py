@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from .._gaussian_ply import Gaussians
-from .._points import Start
+from .._points.start import FAINT, Start, joined
 
 C0 = 0.28209479177387814  # the constant spherical harmonic, 1 / (2 √π): colour = 0.5 + C0 · coefficient
 NEIGHBOURS = 3
@@ -13,7 +13,6 @@ RATES = {"means": 1.6e-4, "scales": 5e-3, "quats": 1e-3, "opacities": 5e-2, "sh0
 MEANS_DECAY = 0.01
 # (opacity, scale relative to the distance of the neighbours) at the start, of 3DGS and of 3DGS-MCMC
 STARTS = {"default": (0.1, 1.0), "mcmc": (0.5, 0.1)}
-FAINT = {"guessed": 0.1, "ray": 0.03}  # opacity of points whose depth is guessed, so that they fade where it is wrong
 
 Parameters = dict[str, torch.nn.Parameter]
 Optimizers = dict[str, torch.optim.Optimizer]
@@ -26,8 +25,7 @@ def initial(starts: list[Start], strategy: str, degree: int, extent: float) -> G
     """
     from scipy.spatial import KDTree
 
-    xyz = np.concatenate([start.points for start in starts])
-    colours = np.concatenate([start.colours for start in starts])
+    xyz, colours = joined(starts)
     count = len(xyz)
     own, relative = STARTS[strategy]
     opacity = np.concatenate([np.full(len(start), min(own, FAINT.get(start.kind, own))) for start in starts])

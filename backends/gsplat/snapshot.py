@@ -1,19 +1,15 @@
 """Snapshots of a training run, so that one that was killed goes on where it was; on a CPU to the same bytes."""
 
-import json
-import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 
-from ...common.files import whole
+from .. import _snapshot
 from .densification import Densification
 from .gaussians import Optimizers, Parameters
 
-FILE = "snapshot.npz"
 PLAIN = ("step", "seconds", "peak_gpu_bytes", "order", "curve")
 
 
@@ -45,23 +41,16 @@ class State:
         if torch.cuda.is_initialized():
             self.peak_gpu_bytes = max(self.peak_gpu_bytes, torch.cuda.max_memory_allocated())
             arrays["torch.cuda"] = torch.cuda.get_rng_state()
-        plain: dict[str, Any] = {
-            name: getattr(self, name) for name in ("step", "seconds", "peak_gpu_bytes", "order", "curve")
-        }
+        plain = {name: getattr(self, name) for name in PLAIN}
         plain |= {"rng": self.rng.bit_generator.state, "rate": optims["means"].param_groups[0]["lr"]}
-        stored: dict[str, Any] = {name: value.cpu().numpy() for name, value in arrays.items()}
-        with whole(folder / FILE) as temporary, open(temporary, "wb") as file:
-            np.savez(file, plain=json.dumps(plain), **stored)
+        _snapshot.write(folder, {name: value.cpu().numpy() for name, value in arrays.items()}, plain)
 
     def load(self, folder: Path, params: Parameters, optims: Optimizers, densification: Densification) -> bool:
         """Changes all of them to what the folder's snapshot says; False where there is none that can be read."""
-        try:
-            with np.load(folder / FILE, allow_pickle=False) as file:
-                stored = {name: file[name] for name in file.files}
-            plain = json.loads(str(stored.pop("plain")))
-            rate, rng = plain.pop("rate"), plain.pop("rng")
-        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+        found = _snapshot.read(folder, lambda arrays, plain: (arrays, plain, plain.pop("rate"), plain.pop("rng")))
+        if found is None:
             return False
+        stored, plain, rate, rng = found
         device = params["means"].device
         tensors = {name: torch.from_numpy(value) for name, value in stored.items()}
         torch.set_rng_state(tensors.pop("torch.cpu"))
@@ -83,8 +72,3 @@ class State:
         for name, value in plain.items():
             setattr(self, name, value)
         return True
-
-    @staticmethod
-    def forget(folder: Path) -> None:
-        """Removes the snapshot of a run that is finished."""
-        (folder / FILE).unlink(missing_ok=True)

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from ...common.errors import UserError
+from .. import _snapshot
 from .._gaussian_ply import Gaussians
 from .._points import Start
 from .._surroundings import NEAR_PLANE, Surroundings
@@ -58,21 +59,27 @@ def fit(task: Task, starts: list[Start], device: str, rasterize: Callable) -> tu
     renderer = Renderer(rasterize, device, options["background"], NEAR_PLANE * task.around.nearest)
     params = renderer.parameters(initial(starts, options["strategy"], options["sh_degree"], extent))
     try:
-        run = _run(task, params, extent, renderer)
+        state = _run(task, params, extent, renderer)
     except torch.cuda.OutOfMemoryError:
         raise UserError(
             f"the GPU's memory is full with {len(params['means'])} Gaussians and {len(data.names)} views of "
             f"{data.cameras.width[0]} pixels width; train at a smaller width, or set gaussians to fewer"
         ) from None
-    used = torch.cuda.get_device_name(device) if device.startswith("cuda") else device
-    found = {"n_primitives": len(params["means"]), "device": used, "threads": torch.get_num_threads()}
-    earlier = run.pop("peak_gpu_bytes")
-    found["peak_gpu_bytes"] = max(earlier, torch.cuda.max_memory_allocated(device)) if device != "cpu" else None
-    return arrays(params), renderer.near, {**run, **found}
+    on_gpu = device.startswith("cuda")
+    found = {
+        "iterations": state.step,
+        "seconds": state.seconds,
+        "curve": state.curve,
+        "n_primitives": len(params["means"]),
+        "device": torch.cuda.get_device_name(device) if on_gpu else device,
+        "threads": torch.get_num_threads(),
+        "peak_gpu_bytes": max(state.peak_gpu_bytes, torch.cuda.max_memory_allocated(device)) if on_gpu else None,
+    }
+    return arrays(params), renderer.near, found
 
 
-def _run(task: Task, params: Parameters, extent: float, renderer: Renderer) -> dict[str, Any]:
-    """Changes `params` in place, step by step; returns iterations, seconds, curve and the killed parts' memory."""
+def _run(task: Task, params: Parameters, extent: float, renderer: Renderer) -> State:
+    """Changes `params` in place, step by step; returns where it ended."""
     data, limit = task.data, task.budget.seconds
     steps = task.budget.iterations or PAPER_STEPS
     optims = optimizers(params, extent)
@@ -112,9 +119,8 @@ def _run(task: Task, params: Parameters, extent: float, renderer: Renderer) -> d
             state.save(task.out, params, optims, densification)
             saved = time.monotonic()
         clock.start()
-    State.forget(task.out)
-    names = {"iterations": "step", "seconds": "seconds", "curve": "curve", "peak_gpu_bytes": "peak_gpu_bytes"}
-    return {name: getattr(state, field) for name, field in names.items()}
+    _snapshot.forget(task.out)
+    return state
 
 
 def _probe(report: Report, params: Parameters, degree: int, renderer: Renderer) -> float | None:

@@ -4,15 +4,15 @@ import dataclasses
 
 import numpy as np
 
-from .._points import Start, Wanted, starting_points
+from .._points import Wanted, starting_points
+from .._points.start import FAINT, Start, joined
 from .._surroundings import Surroundings
 from .._types import Seeding, TrainingSet
 from .layout import LOG_SCALE, LOGIT, MEAN, SH0, SH_C0, empty
 from .options import Options
 from .shell import shell
 
-# Where the depth is not known, almost transparent, so that what is wrong fades; elsewhere the option `opacity` says it.
-OPACITIES = {"guessed": 0.1, "ray": 0.03, "random": 0.1, "shell": 0.5}
+OPACITIES = {**FAINT, "random": 0.1, "shell": 0.5}  # elsewhere the option `opacity` says it
 
 
 def initial(
@@ -22,12 +22,10 @@ def initial(
 
     Raises UserError when a source of points that was asked for has none.
     """
-    extent = around.extent
     shell_count = min(o.shell, o.gaussians // 2)
     wanted = Wanted(o.points, o.gaussians - shell_count, fills=True, sweep=o.sweep)
     starts, seeding = starting_points(data, wanted, around, rng)
-    points = np.concatenate([start.points for start in starts])
-    scales = o.scale * np.maximum(spacing(points), 1e-6 * extent)
+    scales = o.scale * np.maximum(spacing(joined(starts)[0]), 1e-6 * around.extent)
     if shell_count:
         positions, colours, size = shell(data, shell_count, around)
         starts.append(Start(positions, colours, "shell"))
@@ -38,11 +36,12 @@ def initial(
 
 def _gaussians(starts: list[Start], scales: np.ndarray, o: Options) -> np.ndarray:
     gaussians = empty(len(scales), o.sh_degree)
-    gaussians[MEAN : MEAN + 3] = np.concatenate([start.points for start in starts]).T
+    points, colours = joined(starts)
+    gaussians[MEAN : MEAN + 3] = points.T
     gaussians[LOG_SCALE : LOG_SCALE + 3] = np.log(scales)
     opacity = np.concatenate([np.full(len(start), OPACITIES.get(start.kind, o.opacity)) for start in starts])
     gaussians[LOGIT] = np.log(opacity / (1 - opacity))
-    gaussians[SH0 : SH0 + 3] = (np.concatenate([start.colours for start in starts]).T - 0.5) / SH_C0
+    gaussians[SH0 : SH0 + 3] = (colours.T - 0.5) / SH_C0
     return gaussians
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ...common.errors import UserError
 from ...common.files import write_json
 from ...scenes.types import Cameras
+from .. import _snapshot
 from .._points import knowing
 from .._surroundings import surroundings
 from .._types import Budget, Report, Trained, TrainingSet
@@ -86,7 +87,7 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
     model = _finite(state.gaussians)
     ply.write(out / "model.ply", model)
     write_json(out / "splat.json", dataclasses.asdict(rendering))
-    State.forget(out)
+    _snapshot.forget(out)
     return Trained(
         iterations=state.step,
         seconds=state.seconds,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from viewbench.backends._points import SWEEP, Wanted, knowing, starting_points
+from viewbench.backends._points.start import joined
 from viewbench.backends._surroundings import surroundings
 from viewbench.backends._types import SOURCES
 from viewbench.common.errors import UserError
@@ -17,7 +18,7 @@ def points_of(data, source, rng=RNG, **how):
     """(P, 3) positions, (P, 3) colours and the record."""
     data = knowing(data, source)
     starts, seeding = starting_points(data, Wanted(source, **how), surroundings(data.training, data.points), rng)
-    return np.concatenate([s.points for s in starts]), np.concatenate([s.colours for s in starts]), asdict(seeding)
+    return *joined(starts), asdict(seeding)
 
 
 def test_selected_points_are_those_that_two_chosen_views_see(take_views):

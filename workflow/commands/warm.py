@@ -9,18 +9,17 @@ import click
 def command(backend: str | None, selector: str | None) -> None:
     """Compile and cache whatever BACKEND and SELECTOR compile; those that compile nothing return at once."""
     from ...backends import _registry
-    from ...common import gpu, plugins
+    from ...common import plugins
     from ...common import settings as settings_file
 
     prepared, settings = [], settings_file.load()
     if backend or not selector:
-        prepared.append(_registry.load(backend or "splat", settings))
+        trainer = _registry.load(backend or "splat", settings)
+        _registry.hold_gpu(trainer, settings)
+        prepared.append(trainer)
     if selector:
         prepared.append(plugins.load("selectors", selector))
     for plugin in prepared:
-        capabilities = getattr(plugin, "CAPABILITIES", None)
-        if capabilities is not None and capabilities.device == "cuda":
-            gpu.hold(_registry.device_of(settings))
         warm = getattr(plugin, "warm", None)
         if warm is not None:
             warm()
