@@ -14,7 +14,13 @@ from .files import user_cache
 from .settings import PACKAGE
 
 # Files with kernels, and with the constants and functions that are compiled into them.
-SOURCES = ("common/kernels.py", "backends/_points/*.py", "backends/splat/*.py", "selectors/_coverage_kernels.py")
+SOURCES = (
+    "common/kernels.py",
+    "common/lanes.py",
+    "backends/_points/*.py",
+    "backends/splat/*.py",
+    "selectors/_coverage_kernels.py",
+)
 
 
 def sources() -> list[Path]:
@@ -48,7 +54,10 @@ def _prepare() -> None:
 
 _prepare()
 
-from numba import njit  # noqa: E402
+import numba.core.errors  # noqa: E402
+import numba.core.types  # noqa: E402
+import numba.core.typing.templates  # noqa: E402
+import numba.extending  # noqa: E402
 
 # Sums may be reordered and divisions turned into multiplications: the same bits on one machine, not on every one.
 FAST: Any = {
@@ -57,6 +66,9 @@ FAST: Any = {
     "boundscheck": False,
     "nogil": True,
 }
-compiled = njit(cache=True, **FAST)
-inlined = njit(inline="always", **FAST)
-strict = njit(cache=True)  # arithmetic as Python has it, in the order in which it is written
+compiled = numba.njit(cache=True, **FAST)
+inlined = numba.njit(inline="always", **FAST)
+strict = numba.njit(cache=True)  # arithmetic as Python has it, in the order in which it is written
+# The same without Python's checks, and without the lock that keeps other threads waiting.
+exact = numba.njit(cache=True, error_model="numpy", boundscheck=False, nogil=True)
+written = numba.njit(inline="always", error_model="numpy", boundscheck=False)  # inlined into such

@@ -1,9 +1,9 @@
 """Which splats touch which 8 x 8 tile, each tile's in order of depth.
 
 One radix sort of the visible splats by depth, then each splat is written to the tiles that its ellipse
-{d : dᵀ Q d < cut} touches, row of tiles by row of tiles, found exactly; a counting fill keeps the depth order in each
-tile. Every (splat, tile) pair has a slot of its own for gradients, grouped by splat: no atomics, and the same bytes on
-every run.
+{d : dᵀ Q d < cut} touches, row of pixels by row of pixels, found exactly, with those 4 x 4 quarters of a tile that it
+touches; a counting fill keeps the depth order in each tile. Every (splat, tile) pair has a slot of its own for
+gradients, grouped by splat: no atomics, and the same bytes on every run and for any number of threads.
 """
 
 import math
@@ -11,48 +11,45 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.kernels import compiled
-from .kernels import HALF, ONE, ZERO, F
-from .projection import (
-    CONIC_A,
-    CONIC_B,
-    CONIC_C,
-    CUT,
-    DEPTH,
-    HALF_HEIGHT,
-    X,
-    Y,
-)
+from ...common.kernels import exact, written
+from ...common.lanes import floor, fma, larger, numbers, smaller, spread, sqrt, store, where
+from .kernels import HALF, ZERO, F
+from .projection import CURVE, HALF_HEIGHT, SLOPE, SQUARE, TILE, WIDEST, X, Y
 
-TILE = 8  # pixels; 64 of them are a few vectors, and small tiles waste little on small splats
+QUARTER = TILE // 2  # pixels
+ROWS = 16  # of quarters that are looked at at once
+AT_ONCE = 31  # tiles of a row, whose quarters fit the bits of a word
+NOWHERE = F(1 << 24)
 
 
 class Order(NamedTuple):
     """Visible splats in order of depth, and what sorting them takes."""
 
-    indices: np.ndarray  # (N,) int64, the first of them used, nearest first
-    keys: np.ndarray  # (N,) uint32, log depth in 22 bits
-    scratch: np.ndarray  # (N,) int64, indices half sorted
+    indices: np.ndarray  # (N,) int32, the first of them used, nearest first
+    keys: np.ndarray  # (N,) uint32, depth in 22 bits
+    scratch: np.ndarray  # (N,) int32, indices half sorted
     scratch_keys: np.ndarray  # (N,) uint32
 
     @classmethod
     def zeros(cls, capacity: int) -> "Order":
         """Room for so many Gaussians."""
-        return cls(*(np.zeros(capacity, kind) for kind in (np.int64, np.uint32, np.int64, np.uint32)))
+        return cls(*(np.zeros(capacity, kind) for kind in (np.int32, np.uint32, np.int32, np.uint32)))
 
 
 class Slots(NamedTuple):
-    """One slot for each of the P pairs (splat, tile) that touch, grouped by splat."""
+    """Slots of the pairs (splat, tile) that touch, grouped by splat; between the groups some stay empty."""
 
-    first: np.ndarray  # (N,) int64, where a splat's slots begin
-    number: np.ndarray  # (N,) int64, how many there are, 0 for splats that are not drawn
-    tile: np.ndarray  # (at least P,) int64, by slot
-    splat: np.ndarray  # (at least P,) int64, by slot
+    first: np.ndarray  # (N,) int32, where a splat's slots begin
+    number: np.ndarray  # (N,) int32, how many there are, 0 for splats that are not drawn
+    tile: np.ndarray  # (P,) int32, by slot
+    splat: np.ndarray  # (P,) int32, by slot
+    quarters: np.ndarray  # (P,) uint8, by slot: bits of those touched, upper left, upper right, lower left, lower right
 
     @classmethod
     def zeros(cls, capacity: int, pairs: int) -> "Slots":
         """Room for so many Gaussians and pairs."""
-        return cls(*(np.zeros(size, np.int64) for size in (capacity, capacity, pairs, pairs)))
+        first, number = np.zeros(capacity, np.int32), np.zeros(capacity, np.int32)
+        return cls(first, number, np.zeros(pairs, np.int32), np.zeros(pairs, np.int32), np.zeros(pairs, np.uint8))
 
 
 class Tiles(NamedTuple):
@@ -60,112 +57,156 @@ class Tiles(NamedTuple):
 
     width: int  # pixels of the picture
     height: int  # pixels
-    lists: np.ndarray  # (at least P,) int64 slots, tile after tile, nearest first
+    lists: np.ndarray  # (P,) int32 slots, tile after tile, nearest first
     starts: np.ndarray  # (tiles + 1,) int64, where a tile's list begins
     stops: np.ndarray  # (tiles,) int64, where drawing left it, since nothing behind is seen
+    counts: np.ndarray  # (parts, tiles) int64: pairs that each part of the order has in it, then where they go
 
     @classmethod
-    def zeros(cls, width: int, height: int, pairs: int) -> "Tiles":
-        """Of a picture, with room for so many pairs."""
+    def zeros(cls, width: int, height: int, pairs: int, parts: int) -> "Tiles":
+        """Of a picture, with room for so many pairs, filled in so many parts."""
         tiles = -(-width // TILE) * -(-height // TILE)
-        return cls(width, height, *(np.zeros(size, np.int64) for size in (pairs, tiles + 1, tiles)))
+        sizes = tiles + 1, tiles, (parts, tiles)
+        return cls(width, height, np.zeros(pairs, np.int32), *(np.zeros(size, np.int64) for size in sizes))
 
 
-@compiled
-def sort_visible(n, extents, order):
+@exact
+def sort_visible(n, depth, order):
     """Writes the indices of visible splats among the first n, nearest first, into the order; returns their number.
 
-    Sorts 22 bits of log depth, 11 at a time: neighbours closer than 3e-6 of the range keep their storage order.
+    `depth` (N,) is that of the splats as uint32, which has the same order: positive floats count like their bits.
+    Sorts 22 bits of them, 11 at a time: neighbours closer than 4e-6 of their depth keep their storage order (for
+    depths within a factor of 256).
     """
     indices, keys, scratch, scratch_keys = order
     visible = 0
-    nearest, farthest = np.inf, 0.0
+    nearest, farthest = np.uint32(0xFFFFFFFF), np.uint32(0)
     for i in range(n):
-        if extents[i, CUT] > ZERO:
+        key = depth[i]
+        if key > 0:
             indices[visible] = i
+            keys[visible] = key
             visible += 1
-            nearest, farthest = min(nearest, extents[i, DEPTH]), max(farthest, extents[i, DEPTH])
+            nearest, farthest = min(nearest, key), max(farthest, key)
     if visible == 0:
         return 0
-    low = math.log(nearest)
-    largest = 2**22 - 1
-    scale = largest / max(math.log(farthest) - low, 1e-6)
+    drop = np.uint32(0)
+    while (farthest - nearest) >> drop >= np.uint32(1 << 22):
+        drop += np.uint32(1)
     first, second = np.zeros(2048, np.int64), np.zeros(2048, np.int64)
     for j in range(visible):
-        # Clamped: where all depths are nearly one, rounding alone would lead out of the table.
-        key = np.uint32(min(max((math.log(extents[indices[j], DEPTH]) - low) * scale, 0.0), largest))
+        key = (keys[j] - nearest) >> drop
         keys[j] = key
-        first[key & 2047] += 1
-        second[key >> 11] += 1
+        first[key & np.uint32(2047)] += 1
+        second[key >> np.uint32(11)] += 1
     start, other = 0, 0
     for bucket in range(2048):
         start, first[bucket] = start + first[bucket], start
         other, second[bucket] = other + second[bucket], other
     for j in range(visible):
-        bucket = keys[j] & 2047
+        bucket = keys[j] & np.uint32(2047)
         scratch[first[bucket]], scratch_keys[first[bucket]] = indices[j], keys[j]
         first[bucket] += 1
     for j in range(visible):
-        bucket = scratch_keys[j] >> 11
+        bucket = scratch_keys[j] >> np.uint32(11)
         indices[second[bucket]] = scratch[j]
         second[bucket] += 1
     return visible
 
 
-@compiled
-def fill_tiles(visible, order, splats, slots, tiles):
-    """Fills slots and tiles with the `visible` first splats of the order; returns the number of pairs.
-
-    It is -1 when they do not fit. The number of slots of splats that are not visible is set to 0 by the caller.
-    """
-    indices, drawn, extents = order.indices, splats.drawn, splats.extents
-    width, height, lists, starts, _ = tiles
-    across, down = (width + TILE - 1) // TILE, (height + TILE - 1) // TILE
-    counts = np.zeros(across * down + 1, np.int64)
-    pairs = 0
-    capacity = slots.tile.shape[0]
-    size, inverse_size = F(TILE), F(1 / TILE)
-    for j in range(visible):
-        i = indices[j]
-        x, y = drawn[i, X], drawn[i, Y]
-        a, b, c = extents[i, CONIC_A], extents[i, CONIC_B], extents[i, CONIC_C]
-        cut, half_height = extents[i, CUT], extents[i, HALF_HEIGHT]
-        top = max(0, math.floor((y - half_height - HALF) * inverse_size))
-        bottom = min(down - 1, math.floor((y + half_height - HALF) * inverse_size))
-        if pairs + (bottom - top + 1) * across > capacity:
-            return -1
-        begin = pairs
-        # At height d the ellipse spans x - (b/a) d ± sqrt(cut/a - det/a² d²); it is widest to the right at d_right.
-        inverse_a = ONE / a
-        slope, square = b * inverse_a, cut * inverse_a
-        curve = (a * c - b * b) * inverse_a * inverse_a
-        d_right = -b * np.sqrt(cut / (c * (a * c - b * b)))
-        for row in range(top, bottom + 1):
-            low = max(F(row) * size + HALF - y, -half_height)
-            high = min(F(row) * size + size - HALF - y, half_height)
-            if low > high:
-                # The extreme lies between two rows of pixel centres: the row of tiles has none inside.
-                continue
-            at = min(max(d_right, low), high)
-            right = x - slope * at + np.sqrt(max(ZERO, square - curve * at * at))
-            at = min(max(-d_right, low), high)
-            left = x - slope * at - np.sqrt(max(ZERO, square - curve * at * at))
-            first_pixel, last_pixel = math.ceil(left - F(0.501)), math.floor(right - F(0.499))
-            if last_pixel < first_pixel or last_pixel < 0 or first_pixel >= width:
-                continue
-            for column in range(max(first_pixel, 0) // TILE, min(last_pixel, width - 1) // TILE + 1):
-                tile = row * across + column
-                slots.tile[pairs], slots.splat[pairs] = tile, i
-                counts[tile] += 1
-                pairs += 1
-        slots.first[i], slots.number[i] = begin, pairs - begin
+@exact
+def place_slots(visible, order, most, slots):
+    """Gives each of the `visible` first splats of the order its slots; returns how many there must be."""
     total = 0
-    for tile in range(across * down):
-        starts[tile] = total
-        total, counts[tile] = total + counts[tile], total
-    starts[across * down] = total
-    for slot in range(pairs):
-        tile = slots.tile[slot]
-        lists[counts[tile]] = slot
-        counts[tile] += 1
-    return pairs
+    slots.number[:] = 0
+    for j in range(visible):
+        i = order.indices[j]
+        slots.first[i] = total
+        total += int(most[i])
+    return total
+
+
+@written
+def _word(begin, end, start):
+    """Bits from `start` on of the quarters from `begin` to `end`, of as many tiles as are looked at at once."""
+    low, high = min(max(begin - start, 0), 2 * AT_ONCE), min(max(end + 1 - start, 0), 2 * AT_ONCE)
+    return (1 << max(low, high)) - (1 << low)
+
+
+@exact
+def fill_slots(order, drawn, slots, tiles, part, first, last):
+    """Fills the slots of splats `first` to `last` of the order, and counts their pairs tile by tile."""
+    width, height, counts = tiles.width, tiles.height, tiles.counts[part]
+    across, down = (width + TILE - 1) // TILE, (height + TILE - 1) // TILE
+    counts[:] = 0
+    begins, ends = np.empty(ROWS, np.float32), np.empty(ROWS, np.float32)
+    last_row, inverse, inverse_tile = F(2 * down - 1), F(1 / QUARTER), F(1 / TILE)
+    for j in range(first, last):
+        i = order.indices[j]
+        x, y, half_height = drawn[i, X], drawn[i, Y], drawn[i, HALF_HEIGHT]
+        slope, square, curve, widest = drawn[i, SLOPE], drawn[i, SQUARE], drawn[i, CURVE], drawn[i, WIDEST]
+        top = max(0, math.floor((y - half_height - HALF) * inverse_tile))
+        bottom = min(down - 1, math.floor((y + half_height - HALF) * inverse_tile))
+        slot = np.int64(slots.first[i])
+        begin = slot
+        for group in range(top, bottom + 1, ROWS // 2):
+            # What the ellipse spans in 16 rows of quarters, in whole quarters.
+            row = numbers() + F(2 * group)
+            upper = row * F(QUARTER) + (HALF - y)
+            low = larger(upper, spread(-half_height))
+            high = smaller(upper + F(QUARTER - 1), spread(half_height))
+            at = smaller(larger(spread(widest), low), high)
+            right = fma(-slope, at, x) + sqrt(larger(fma(-curve, at * at, square), spread(ZERO)))
+            at = smaller(larger(spread(-widest), low), high)
+            left = fma(-slope, at, x) - sqrt(larger(fma(-curve, at * at, square), spread(ZERO)))
+            # Pixels whose centres are inside, and a thousandth of a pixel around it.
+            first_pixel = larger(-floor(F(0.501) - left), spread(ZERO))
+            last_pixel = smaller(floor(right - F(0.499)), spread(F(width - 1)))
+            # The extreme may lie between two rows of pixel centres: then there is none inside.
+            touched = (low <= high) & (first_pixel <= last_pixel) & (row <= last_row)
+            store(begins, 0, where(touched, floor(first_pixel * inverse), spread(NOWHERE)))
+            store(ends, 0, where(touched, floor(last_pixel * inverse), spread(F(-1))))
+            for tile_row in range(group, min(group + ROWS // 2, bottom + 1)):
+                k = 2 * (tile_row - group)
+                begin_0, end_0, begin_1, end_1 = int(begins[k]), int(ends[k]), int(begins[k + 1]), int(ends[k + 1])
+                end = max(end_0, end_1) // 2 + 1
+                for start in range(min(begin_0, begin_1) // 2, end, AT_ONCE):
+                    above, below = _word(begin_0, end_0, 2 * start), _word(begin_1, end_1, 2 * start)
+                    for column in range(start, min(start + AT_ONCE, end)):
+                        quarters = (above & 3) | ((below & 3) << 2)
+                        above >>= 2
+                        below >>= 2
+                        if quarters == 0:
+                            continue
+                        tile = tile_row * across + column
+                        slots.tile[slot], slots.splat[slot], slots.quarters[slot] = tile, i, quarters
+                        counts[tile] += 1
+                        slot += 1
+        slots.number[i] = slot - begin
+
+
+@exact
+def place_lists(tiles):
+    """Turns the counts into places in the lists, the parts' one behind the other in each tile; returns their sum."""
+    counts, total = tiles.counts, 0
+    for tile in range(counts.shape[1]):
+        tiles.starts[tile] = total
+        for part in range(counts.shape[0]):
+            count = counts[part, tile]
+            counts[part, tile] = total
+            total += count
+    tiles.starts[counts.shape[1]] = total
+    return total
+
+
+@exact
+def fill_lists(order, slots, tiles, part, first, last):
+    """Puts the slots of splats `first` to `last` of the order into the lists of their tiles."""
+    lists, places = tiles.lists, tiles.counts[part]
+    for j in range(first, last):
+        i = order.indices[j]
+        begin = np.int64(slots.first[i])
+        for slot in range(begin, begin + slots.number[i]):
+            tile = slots.tile[slot]
+            lists[places[tile]] = slot
+            places[tile] += 1

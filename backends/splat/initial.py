@@ -10,7 +10,9 @@ from .._surroundings import Surroundings
 from .._types import Seeding, TrainingSet
 from .layout import LOG_SCALE, LOGIT, MEAN, SH0, SH_C0, empty
 from .options import Options
-from .shell import shell
+from .shell import RADIUS, shell
+
+CELLS = 10  # bits of a cell's number along each axis
 
 OPACITIES = {**FAINT, "random": 0.1, "shell": 0.5}  # elsewhere the option `opacity` says it
 
@@ -31,7 +33,9 @@ def initial(
         starts.append(Start(positions, colours, "shell"))
         scales = np.append(scales, np.full(shell_count, size))
     seeding = dataclasses.replace(seeding, count=len(scales), shell_points=shell_count)
-    return _gaussians(starts, scales, o), seeding
+    made = _gaussians(starts, scales, o)
+    order = along_curve((made[MEAN : MEAN + 3].T - around.centre) / (RADIUS * around.extent))
+    return np.ascontiguousarray(made[:, order]), seeding
 
 
 def _gaussians(starts: list[Start], scales: np.ndarray, o: Options) -> np.ndarray:
@@ -53,3 +57,16 @@ def spacing(points: np.ndarray) -> np.ndarray:
         return np.linalg.norm(points - points.mean(axis=0), axis=1)
     distance, _ = KDTree(points, leafsize=16).query(points, k=4)
     return np.sqrt((distance[:, 1:] ** 2).mean(axis=1))
+
+
+def along_curve(points: np.ndarray) -> np.ndarray:
+    """(N,) order of points (N, 3) in [-1, 1] along Morton's curve (1966), which keeps neighbours together.
+
+    A view sees Gaussians sixteen at a time, so that those which it does not see should lie together.
+    """
+    cells = np.clip((points + 1) * 2.0 ** (CELLS - 1), 0, 2**CELLS - 1).astype(np.int64)
+    code = np.zeros(len(points), np.int64)
+    for bit in range(CELLS):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")

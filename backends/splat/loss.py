@@ -1,7 +1,8 @@
 """The training loss of 3DGS, (1 - λ) L1 + λ (1 - SSIM), and its gradient with respect to the picture.
 
 SSIM as Wang et al. 2004: 11 x 11 Gaussian window with σ = 1.5, zero beyond the picture, C₁ = 0.01², C₂ = 0.03². The
-window is separable; images lie in planes padded by 5 zeros on each side, so that both passes are long flat loops.
+window is separable; images lie in planes padded by 5 zeros on each side, which are gone through row by row, so that
+what the window needs of the last 11 rows stays in the cache.
 With µ, E = blur(x²) and F = blur(xy), SSIM = A₁A₂ / (B₁B₂), A₁ = 2µµ_y + C₁, A₂ = 2(F - µµ_y) + C₂,
 B₁ = µ² + µ_y² + C₁, B₂ = E - µ² + var_y + C₂, and ∂/∂x = blur(∂/∂µ) + 2x blur(∂/∂E) + y blur(∂/∂F).
 """
@@ -10,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.kernels import compiled
+from ...common.kernels import exact, written
+from ...common.lanes import fma, load, magnitude, shifted, spread, store, where
 from .kernels import ONE, TWO, ZERO, F
 from .planes import RADIUS, Planes
 
@@ -18,8 +20,7 @@ C1, C2 = F(1e-4), F(9e-4)
 _window = np.exp(-(np.arange(-RADIUS, RADIUS + 1) ** 2) / (2 * 1.5**2))
 WINDOW = _window / _window.sum()
 W0, W1, W2, W3, W4, W5 = (F(WINDOW[RADIUS + offset]) for offset in range(6))
-# Unsigned offsets: with signed ones the compiler must allow for wrapping and gives up on vectors.
-U1, U2, U3, U4, U5, U6, U7, U8, U9, U10 = (np.uint64(offset) for offset in range(1, 11))
+LINES = 32  # rows that the window has gone along are kept, the last 10 of which it goes down
 
 
 class Target(NamedTuple):
@@ -49,124 +50,170 @@ class Target(NamedTuple):
 
 
 class Local(NamedTuple):
-    """What SSIM takes of the window around each pixel of one channel, or the derivatives by it."""
+    """What SSIM takes of the window around each pixel, or the derivatives by it."""
 
-    mean: np.ndarray  # (size,) float32, µ
-    square: np.ndarray  # (size,) float32, E
-    product: np.ndarray  # (size,) float32, F
+    mean: np.ndarray  # (3, size) float32, µ
+    square: np.ndarray  # (3, size) float32, E
+    product: np.ndarray  # (3, size) float32, F
 
 
 class Workspace(NamedTuple):
     """What the loss of pictures of one size works in."""
 
-    planes: np.ndarray  # (8, size) float32
-    mask: np.ndarray  # (size,) float32, 1 inside the picture and 0 around it
-    stride: int  # from one row of a plane to the next
-    pixels: int  # of the picture, padding not counted
+    by: Local
+    similarity: np.ndarray  # (3, H, 16) float32: of each row, SSIM summed up sixteen times
+    absolute: np.ndarray  # (3, H, 16) float32: the same of |x - y|
+    mask: np.ndarray  # (stride,) float32, 1 in the columns of the picture and 0 beside it
+    height: int  # pixels
+    pixels: int
 
     @classmethod
     def of(cls, planes: Planes) -> "Workspace":
         """For pictures in these planes."""
-        mask = planes.zeros(1)[0]
-        planes.inside(mask)[:] = 1
-        return cls(planes.zeros(8), mask, planes.stride, planes.width * planes.height)
-
-
-@compiled
-def _blur_rows(a, out, n):
-    for i in range(np.uint64(n)):
-        out[i + U5] = (
-            W0 * a[i + U5]
-            + W1 * (a[i + U4] + a[i + U6])
-            + W2 * (a[i + U3] + a[i + U7])
-            + W3 * (a[i + U2] + a[i + U8])
-            + W4 * (a[i + U1] + a[i + U9])
-            + W5 * (a[i] + a[i + U10])
+        mask = np.zeros(planes.stride, np.float32)
+        mask[RADIUS : RADIUS + planes.width] = 1
+        rows = np.zeros((2, 3, planes.height, 16), np.float32)
+        return cls(
+            Local(planes.zeros(3), planes.zeros(3), planes.zeros(3)),
+            rows[0],
+            rows[1],
+            mask,
+            planes.height,
+            planes.width * planes.height,
         )
 
 
-@compiled
-def _blur_columns(a, out, n, stride):
-    s1 = np.uint64(stride)
-    s2, s3, s4, s5 = s1 * U2, s1 * U3, s1 * U4, s1 * U5
-    s6, s7, s8, s9, s10 = s1 * U6, s1 * U7, s1 * U8, s1 * U9, s1 * U10
-    for i in range(np.uint64(n)):
-        out[i + s5] = (
-            W0 * a[i + s5]
-            + W1 * (a[i + s4] + a[i + s6])
-            + W2 * (a[i + s3] + a[i + s7])
-            + W3 * (a[i + s2] + a[i + s8])
-            + W4 * (a[i + s1] + a[i + s9])
-            + W5 * (a[i] + a[i + s10])
-        )
+@written
+def _across(before, here, behind):
+    """The window along a row, of 16 pixels and the 16 to each side."""
+    total = W0 * here
+    total = fma(W1, shifted(before, here, 15) + shifted(here, behind, 1), total)
+    total = fma(W2, shifted(before, here, 14) + shifted(here, behind, 2), total)
+    total = fma(W3, shifted(before, here, 13) + shifted(here, behind, 3), total)
+    total = fma(W4, shifted(before, here, 12) + shifted(here, behind, 4), total)
+    return fma(W5, shifted(before, here, 11) + shifted(here, behind, 5), total)
 
 
-@compiled
-def _multiply(a, b, out, n):
-    for i in range(n):
-        out[i] = a[i] * b[i]
+@written
+def _down(lines, at, stride):
+    """The window along a column: `at` is where in `lines` the 16 pixels lie of its uppermost row."""
+    total = W0 * load(lines, at + 5 * stride)
+    total = fma(W1, load(lines, at + 4 * stride) + load(lines, at + 6 * stride), total)
+    total = fma(W2, load(lines, at + 3 * stride) + load(lines, at + 7 * stride), total)
+    total = fma(W3, load(lines, at + 2 * stride) + load(lines, at + 8 * stride), total)
+    total = fma(W4, load(lines, at + stride) + load(lines, at + 9 * stride), total)
+    return fma(W5, load(lines, at) + load(lines, at + 10 * stride), total)
 
 
-@compiled
-def _ssim(x, mean_y, var_y, mask, scale, by):
-    """Sum of SSIM over the picture; writes `scale` times its derivatives by µ, E and F."""
-    total = ZERO
-    for i in range(mask.shape[0]):
-        m, my, inside = x.mean[i], mean_y[i], mask[i]
-        a1, a2 = TWO * m * my + C1, TWO * (x.product[i] - m * my) + C2
-        b1 = ONE / (m * m + my * my + C1)
-        b2 = ONE / (x.square[i] - m * m + var_y[i] + C2)
-        both = b1 * b2
-        value = a1 * a2 * both
-        total += value * inside
-        by_product = TWO * a1 * both
-        by_square = -value * b2
-        by_mean = TWO * my * a2 * both - TWO * m * value * b1 - my * by_product - TWO * m * by_square
-        factor = scale * inside
-        by.mean[i], by.square[i], by.product[i] = factor * by_mean, factor * TWO * by_square, factor * by_product
-    return total
+@written
+def _next(slot, lines, stride):
+    """Where among `lines` the next row goes; behind the last place the rows that are still needed move to the front."""
+    if slot < LINES:
+        return slot
+    for kind in range(0, 3 * LINES * stride, LINES * stride):
+        for at in range(kind, kind + 2 * RADIUS * stride, 16):
+            store(lines, at, load(lines, at + (LINES - 2 * RADIUS) * stride))
+    return 2 * RADIUS
 
 
-@compiled
-def _gradient(x, y, by, step, out):
-    """Writes the gradient of the whole loss; returns the sum of |x - y|."""
-    total = ZERO
-    for i in range(out.shape[0]):
-        difference = x[i] - y[i]
-        total += abs(difference)
-        sign = step if difference > ZERO else (-step if difference < ZERO else ZERO)
-        out[i] = by.mean[i] + x[i] * by.square[i] + y[i] * by.product[i] + sign
-    return total
-
-
-@compiled
-def loss(image, target, weight, workspace, gradient):
-    """The loss of image (3, size), a float; fills gradient (3, size). Both are padded planes; `weight` is λ."""
-    work, mask, stride, pixels = workspace
-    n = image.shape[1]
-    flat, tall = n - 2 * RADIUS, n - 2 * RADIUS * stride
-    inverse = ONE / F(3 * pixels)
-    step = (ONE - weight) * inverse
-    total = 0.0
+@exact
+def compare(image, target, weight, workspace, first, last):
+    """Fills the derivatives and sums of SSIM of rows `first` to `last` of the picture, image (3, size)."""
+    stride = workspace.mask.shape[0]
+    scale = -weight / F(3 * workspace.pixels)
+    lines, zero = np.empty(3 * LINES * stride, np.float32), spread(ZERO)
+    second, third = LINES * stride, 2 * LINES * stride
     for c in range(3):
-        x, y = image[c], target.image[c]
-        _multiply(x, x, work[0], n)
-        _multiply(x, y, work[1], n)
-        _blur_rows(x, work[2], flat)
-        _blur_rows(work[0], work[3], flat)
-        _blur_rows(work[1], work[4], flat)
-        _blur_columns(work[2], work[5], tall, stride)
-        _blur_columns(work[3], work[6], tall, stride)
-        _blur_columns(work[4], work[7], tall, stride)
-        by = Local(work[0], work[1], work[2])
-        local = Local(work[5], work[6], work[7])
-        similarity = _ssim(local, target.mean[c], target.variance[c], mask, -weight * inverse, by)
-        _blur_rows(work[0], work[3], flat)
-        _blur_rows(work[1], work[4], flat)
-        _blur_rows(work[2], work[5], flat)
-        _blur_columns(work[3], work[0], tall, stride)
-        _blur_columns(work[4], work[1], tall, stride)
-        _blur_columns(work[5], work[2], tall, stride)
-        absolute = _gradient(x, y, by, step, gradient[c])
-        total += weight * inverse * (F(pixels) - similarity) + step * absolute
-    return total
+        x, y, mean_y, var_y = image[c], target.image[c], target.mean[c], target.variance[c]
+        by_mean, by_square, by_product = workspace.by.mean[c], workspace.by.square[c], workspace.by.product[c]
+        slot = 0
+        for line in range(first, last + 2 * RADIUS):
+            slot = _next(slot, lines, stride)
+            own, plane = slot * stride, line * stride
+            slot += 1
+            x0, xx0, xy0 = zero, zero, zero
+            x1 = load(x, plane)
+            xx1, xy1 = x1 * x1, x1 * load(y, plane)
+            for at in range(0, stride, 16):
+                x2, xx2, xy2 = zero, zero, zero
+                if at + 16 < stride:
+                    x2 = load(x, plane + at + 16)
+                    xx2, xy2 = x2 * x2, x2 * load(y, plane + at + 16)
+                store(lines, own + at, _across(x0, x1, x2))
+                store(lines, second + own + at, _across(xx0, xx1, xx2))
+                store(lines, third + own + at, _across(xy0, xy1, xy2))
+                x0, xx0, xy0, x1, xx1, xy1 = x1, xx1, xy1, x2, xx2, xy2
+            row = line - 2 * RADIUS
+            if row < first:
+                continue
+            own, plane = own - 2 * RADIUS * stride, (row + RADIUS) * stride
+            total = zero
+            for at in range(0, stride, 16):
+                inside = load(workspace.mask, at)
+                m, square = _down(lines, own + at, stride), _down(lines, second + own + at, stride)
+                product = _down(lines, third + own + at, stride)
+                my = load(mean_y, plane + at)
+                both_means = m * my
+                a1, a2 = fma(TWO, both_means, C1), fma(TWO, product - both_means, C2)
+                b1 = fma(m, m, fma(my, my, C1))
+                b2 = square - m * m + load(var_y, plane + at) + C2
+                both = ONE / (b1 * b2)
+                value = a1 * a2 * both
+                total = fma(value, inside, total)
+                by_f = TWO * a1 * both
+                by_e = -(value * b1 * both)
+                by_m = TWO * fma(my, a2 * both, -(m * fma(value, b2 * both, by_e))) - my * by_f
+                factor = scale * inside
+                store(by_mean, plane + at, factor * by_m)
+                store(by_square, plane + at, factor * TWO * by_e)
+                store(by_product, plane + at, factor * by_f)
+            store(workspace.similarity[c, row], 0, total)
+
+
+@exact
+def descend(image, target, weight, workspace, gradient, first, last):
+    """Fills rows `first` to `last` of the gradient (3, size) of the whole loss, and the sums of |x - y|."""
+    stride = workspace.mask.shape[0]
+    step = (ONE - weight) / F(3 * workspace.pixels)
+    lines, zero = np.empty(3 * LINES * stride, np.float32), spread(ZERO)
+    second, third = LINES * stride, 2 * LINES * stride
+    for c in range(3):
+        x, y, out = image[c], target.image[c], gradient[c]
+        by_mean, by_square, by_product = workspace.by.mean[c], workspace.by.square[c], workspace.by.product[c]
+        slot = 0
+        for line in range(first, last + 2 * RADIUS):
+            slot = _next(slot, lines, stride)
+            own, plane = slot * stride, line * stride
+            slot += 1
+            m0, e0, f0 = zero, zero, zero
+            m1, e1, f1 = load(by_mean, plane), load(by_square, plane), load(by_product, plane)
+            for at in range(0, stride, 16):
+                m2, e2, f2 = zero, zero, zero
+                if at + 16 < stride:
+                    then = plane + at + 16
+                    m2, e2, f2 = load(by_mean, then), load(by_square, then), load(by_product, then)
+                store(lines, own + at, _across(m0, m1, m2))
+                store(lines, second + own + at, _across(e0, e1, e2))
+                store(lines, third + own + at, _across(f0, f1, f2))
+                m0, e0, f0, m1, e1, f1 = m1, e1, f1, m2, e2, f2
+            row = line - 2 * RADIUS
+            if row < first:
+                continue
+            own, plane = own - 2 * RADIUS * stride, (row + RADIUS) * stride
+            total = zero
+            for at in range(0, stride, 16):
+                here, there = load(x, plane + at), load(y, plane + at)
+                difference = here - there
+                total = total + magnitude(difference)
+                sign = where(difference > ZERO, spread(step), where(difference < ZERO, spread(-step), zero))
+                value = fma(here, _down(lines, second + own + at, stride), _down(lines, own + at, stride))
+                value = fma(there, _down(lines, third + own + at, stride), value)
+                store(out, plane + at, (value + sign) * load(workspace.mask, at))
+            store(workspace.absolute[c, row], 0, total)
+
+
+def loss(workspace: Workspace, weight: float) -> float:
+    """The loss of the picture that both kernels have gone through; `weight` is λ."""
+    similarity, absolute = workspace.similarity.sum(dtype=np.float64), workspace.absolute.sum(dtype=np.float64)
+    count = 3 * workspace.pixels
+    return float(weight * (1 - similarity / count) + (1 - weight) * absolute / count)

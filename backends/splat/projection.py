@@ -17,10 +17,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.kernels import compiled, inlined
+from ...common.kernels import exact, written
+from ...common.lanes import (
+    aligned,
+    bits,
+    dot,
+    exp,
+    floor,
+    fma,
+    larger,
+    load_some,
+    log2,
+    lowest,
+    numbers,
+    sigmoid,
+    smaller,
+    spread,
+    sqrt,
+    store,
+    where,
+)
 from ...scenes.types import OPENCV, Cameras
 from .harmonics import MOST, colour, fill_basis
-from .kernels import HALF, LOG2E, ONE, TWO, ZERO, F, exp, sigmoid
+from .kernels import HALF, LOG2E, ONE, TWO, ZERO, F
 from .layout import LOG_SCALE, LOGIT, MEAN, QUATERNION
 
 FAINTEST = F(2.5e-5)  # of the squared factor that `antialias` multiplies opacities by
@@ -30,13 +49,16 @@ MIN_ALPHA_LOG2 = F(7.994353436858858)  # -log2(1/255): below it a splat is not d
 # A camera as kernels take it: 21 float32.
 ROTATION, TRANSLATION, FX, FY, CX, CY, POSITION, WIDTH, HEIGHT = 0, 9, 12, 13, 14, 15, 16, 19, 20
 
+TILE = 8  # pixels; 64 of them are a few vectors, and small tiles waste little on small splats
+
 # Columns of `Splats.drawn`. With d = pixel - mean, log2 of alpha is
 # L - (A dx² + B dx dy + C dy²): the conic with ½ and log2 e folded in.
 X, Y, A, B, C, LOG2_OPACITY, RED, GREEN, BLUE = range(9)
+# Where the ellipse at which alpha is 1/255 lies: half its height; at height d it spans x - SLOPE d ± sqrt(SQUARE -
+# CURVE d²), and it is widest to the right at d = WIDEST.
+HALF_HEIGHT, SLOPE, SQUARE, CURVE, WIDEST = range(9, 14)
+COLUMNS = 14
 SPLAT_COLUMNS = 16  # padded to a cache line
-# Columns of `Splats.extents`: conic, squared radius at which alpha is 1/255, half box, depth.
-CONIC_A, CONIC_B, CONIC_C, CUT, HALF_WIDTH, HALF_HEIGHT, DEPTH = range(7)
-EXTENT_COLUMNS = 8
 
 
 class View(NamedTuple):
@@ -52,13 +74,18 @@ class View(NamedTuple):
 class Splats(NamedTuple):
     """Gaussians on the screen."""
 
-    drawn: np.ndarray  # (N, SPLAT_COLUMNS) float32, what the rasteriser reads
-    extents: np.ndarray  # (N, EXTENT_COLUMNS) float32, what binning reads; CUT < 0 where nothing is seen
+    drawn: np.ndarray  # (N, SPLAT_COLUMNS) float32, of those that are seen
+    depth: np.ndarray  # (N,) float32, 0 where nothing is seen
+    most: np.ndarray  # (N,) float32, a bound on the tiles that are touched
 
     @classmethod
     def zeros(cls, capacity: int) -> "Splats":
-        """Room for so many Gaussians."""
-        return cls(*(np.zeros((capacity, columns), np.float32) for columns in (SPLAT_COLUMNS, EXTENT_COLUMNS)))
+        """Room for so many Gaussians, a multiple of 16."""
+        return cls(
+            np.zeros((capacity, SPLAT_COLUMNS), np.float32),
+            np.zeros(capacity, np.float32),
+            np.zeros(capacity, np.float32),
+        )
 
 
 def camera_vectors(cameras: Cameras) -> np.ndarray:
@@ -70,124 +97,167 @@ def camera_vectors(cameras: Cameras) -> np.ndarray:
     return np.concatenate(parts, axis=1).astype(np.float32)
 
 
-@inlined
-def to_camera(g, cam, i):
+# Each of these is of the 16 Gaussians from i on, those of them that the mask `which` names.
+
+
+@written
+def to_camera(g, cam, i, which):
     """t = W m + d."""
-    x, y, z = g[MEAN, i], g[MEAN + 1, i], g[MEAN + 2, i]
-    tx = cam[0] * x + cam[1] * y + cam[2] * z + cam[9]
-    ty = cam[3] * x + cam[4] * y + cam[5] * z + cam[10]
-    tz = cam[6] * x + cam[7] * y + cam[8] * z + cam[11]
+    x, y, z = load_some(g, MEAN, i, which), load_some(g, MEAN + 1, i, which), load_some(g, MEAN + 2, i, which)
+    tx = fma(cam[0], x, fma(cam[1], y, fma(cam[2], z, cam[9])))
+    ty = fma(cam[3], x, fma(cam[4], y, fma(cam[5], z, cam[10])))
+    tz = fma(cam[6], x, fma(cam[7], y, fma(cam[8], z, cam[11])))
     return tx, ty, tz
 
 
-@inlined
-def unit_quaternion(g, i):
+@written
+def unit_quaternion(g, i, which):
     """(w, x, y, z) of length 1, and 1 / length."""
-    w, x, y, z = g[QUATERNION, i], g[QUATERNION + 1, i], g[QUATERNION + 2, i], g[QUATERNION + 3, i]
-    inverse = ONE / np.sqrt(w * w + x * x + y * y + z * z + F(1e-20))
+    w, x = load_some(g, QUATERNION, i, which), load_some(g, QUATERNION + 1, i, which)
+    y, z = load_some(g, QUATERNION + 2, i, which), load_some(g, QUATERNION + 3, i, which)
+    inverse = ONE / sqrt(fma(w, w, dot(x, x, y, y, z, z)) + F(1e-20))
     return w * inverse, x * inverse, y * inverse, z * inverse, inverse
 
 
-@inlined
+@written
 def shape(w, x, y, z, s0, s1, s2):
     """M = R(q) diag(s), row by row."""
     return (
-        (ONE - TWO * (y * y + z * z)) * s0,
-        TWO * (x * y - w * z) * s1,
-        TWO * (x * z + w * y) * s2,
-        TWO * (x * y + w * z) * s0,
-        (ONE - TWO * (x * x + z * z)) * s1,
-        TWO * (y * z - w * x) * s2,
-        TWO * (x * z - w * y) * s0,
-        TWO * (y * z + w * x) * s1,
-        (ONE - TWO * (x * x + y * y)) * s2,
+        (ONE - TWO * fma(y, y, z * z)) * s0,
+        TWO * fma(x, y, -(w * z)) * s1,
+        TWO * fma(x, z, w * y) * s2,
+        TWO * fma(x, y, w * z) * s0,
+        (ONE - TWO * fma(x, x, z * z)) * s1,
+        TWO * fma(y, z, -(w * x)) * s2,
+        TWO * fma(x, z, -(w * y)) * s0,
+        TWO * fma(y, z, w * x) * s1,
+        (ONE - TWO * fma(x, x, y * y)) * s2,
     )
 
 
-@inlined
+@written
 def clamped(ratio, limit):
     """tx/tz (or ty/tz) where J is taken."""
-    return min(max(ratio, -limit), limit)
+    return smaller(larger(ratio, -limit), limit)
 
 
-@inlined
+@written
 def jacobian_rows(cam, rz, u, v):
     """T = J W, its two rows."""
     j0, j1 = cam[FX] * rz, cam[FY] * rz
-    j2, j3 = -j0 * u, -j1 * v
+    j2, j3 = -(j0 * u), -(j1 * v)
     return (
-        j0 * cam[0] + j2 * cam[6],
-        j0 * cam[1] + j2 * cam[7],
-        j0 * cam[2] + j2 * cam[8],
-        j1 * cam[3] + j3 * cam[6],
-        j1 * cam[4] + j3 * cam[7],
-        j1 * cam[5] + j3 * cam[8],
+        fma(j0, cam[0], j2 * cam[6]),
+        fma(j0, cam[1], j2 * cam[7]),
+        fma(j0, cam[2], j2 * cam[8]),
+        fma(j1, cam[3], j3 * cam[6]),
+        fma(j1, cam[4], j3 * cam[7]),
+        fma(j1, cam[5], j3 * cam[8]),
     )
 
 
-@inlined
-def view_direction(g, cam, i):
+@written
+def on_screen(t, m):
+    """U = T M, its two rows."""
+    return (
+        dot(t[0], m[0], t[1], m[3], t[2], m[6]),
+        dot(t[0], m[1], t[1], m[4], t[2], m[7]),
+        dot(t[0], m[2], t[1], m[5], t[2], m[8]),
+        dot(t[3], m[0], t[4], m[3], t[5], m[6]),
+        dot(t[3], m[1], t[4], m[4], t[5], m[7]),
+        dot(t[3], m[2], t[4], m[5], t[5], m[8]),
+    )
+
+
+@written
+def covariance(u):
+    """U Uᵀ: its elements xx, xy, yy, and its determinant, by the rows' cross product, which cancels nothing."""
+    a = dot(u[0], u[0], u[1], u[1], u[2], u[2])
+    b = dot(u[0], u[3], u[1], u[4], u[2], u[5])
+    c = dot(u[3], u[3], u[4], u[4], u[5], u[5])
+    x, y, z = fma(u[1], u[5], -(u[2] * u[4])), fma(u[2], u[3], -(u[0] * u[5])), fma(u[0], u[4], -(u[1] * u[3]))
+    return a, b, c, dot(x, x, y, y, z, z)
+
+
+@written
+def view_direction(g, cam, i, which):
     """Unit vector from the camera to the Gaussian."""
-    dx = g[MEAN, i] - cam[POSITION]
-    dy = g[MEAN + 1, i] - cam[POSITION + 1]
-    dz = g[MEAN + 2, i] - cam[POSITION + 2]
-    inverse = ONE / np.sqrt(dx * dx + dy * dy + dz * dz + F(1e-20))
+    dx = load_some(g, MEAN, i, which) - cam[POSITION]
+    dy = load_some(g, MEAN + 1, i, which) - cam[POSITION + 1]
+    dz = load_some(g, MEAN + 2, i, which) - cam[POSITION + 2]
+    inverse = ONE / sqrt(dot(dx, dx, dy, dy, dz, dz) + F(1e-20))
     return dx * inverse, dy * inverse, dz * inverse
 
 
-@compiled
-def project(g, view, splats):
-    """Fills the splats of Gaussians g (rows, N); what is not on the screen gets CUT < 0."""
+@exact
+def project(g, view, splats, first, last):
+    """Fills the splats of Gaussians `first` (a multiple of 16) to `last` of g (rows, N)."""
     cam, degree, near, low_pass, antialias = view
-    drawn, extents = splats
-    fx, fy, cx, cy, width, height = cam[FX], cam[FY], cam[CX], cam[CY], cam[WIDTH], cam[HEIGHT]
-    limit_x, limit_y = HALF * MARGIN * width / fx, HALF * MARGIN * height / fy
-    basis, count = np.empty(MOST, np.float32), (degree + 1) * (degree + 1)
-    for i in range(g.shape[1]):
-        extents[i, CUT] = F(-1)
-        tx, ty, tz = to_camera(g, cam, i)
-        if not tz > near:
-            continue
-        log2_opacity = np.log2(sigmoid(g[LOGIT, i]))
-        if not log2_opacity > -MIN_ALPHA_LOG2:
+    drawn, depth, most = splats
+    width, height = cam[WIDTH], cam[HEIGHT]
+    limit_x, limit_y = spread(HALF * MARGIN * width / cam[FX]), spread(HALF * MARGIN * height / cam[FY])
+    across, down = floor(spread((width + F(TILE - 1)) / F(TILE))), floor(spread((height + F(TILE - 1)) / F(TILE)))
+    memory, basis = np.empty(16 * COLUMNS + 16, np.float32), np.empty(16 * MOST, np.float32)
+    own, count = aligned(memory), (degree + 1) * (degree + 1)
+    for i in range(first, last, 16):
+        inside = numbers() < F(last - i)
+        tx, ty, tz = to_camera(g, cam, i, inside)
+        seen = inside & (tz > near)
+        store(depth, i, spread(ZERO))
+        if bits(seen) == 0:
             continue
         rz = ONE / tz
-        w, x, y, z, _ = unit_quaternion(g, i)
-        s0, s1, s2 = exp(g[LOG_SCALE, i]), exp(g[LOG_SCALE + 1, i]), exp(g[LOG_SCALE + 2, i])
-        m = shape(w, x, y, z, s0, s1, s2)
-        t = jacobian_rows(cam, rz, clamped(tx * rz, limit_x), clamped(ty * rz, limit_y))
-        u0 = t[0] * m[0] + t[1] * m[3] + t[2] * m[6]
-        u1 = t[0] * m[1] + t[1] * m[4] + t[2] * m[7]
-        u2 = t[0] * m[2] + t[1] * m[5] + t[2] * m[8]
-        u3 = t[3] * m[0] + t[4] * m[3] + t[5] * m[6]
-        u4 = t[3] * m[1] + t[4] * m[4] + t[5] * m[7]
-        u5 = t[3] * m[2] + t[4] * m[5] + t[5] * m[8]
-        a = u0 * u0 + u1 * u1 + u2 * u2
-        b = u0 * u3 + u1 * u4 + u2 * u5
-        c = u3 * u3 + u4 * u4 + u5 * u5
-        sharp = a * c - b * b
+        ux, uy = tx * rz, ty * rz
+        w, x, y, z, _ = unit_quaternion(g, i, inside)
+        s0, s1, s2 = (
+            exp(load_some(g, LOG_SCALE, i, inside)),
+            exp(load_some(g, LOG_SCALE + 1, i, inside)),
+            exp(load_some(g, LOG_SCALE + 2, i, inside)),
+        )
+        t = jacobian_rows(cam, rz, clamped(ux, limit_x), clamped(uy, limit_y))
+        a, b, c, sharp = covariance(on_screen(t, shape(w, x, y, z, s0, s1, s2)))
+        determinant = fma(low_pass, a + c + low_pass, sharp)
         a, c = a + low_pass, c + low_pass
-        determinant = a * c - b * b
-        if antialias:
-            log2_opacity += HALF * np.log2(max(sharp / determinant, FAINTEST))
-        cut = TWO * (log2_opacity + MIN_ALPHA_LOG2) / LOG2E
-        if not cut > ZERO:
-            continue
-        px, py = fx * tx * rz + cx, fy * ty * rz + cy
-        rx, ry = np.sqrt(cut * a), np.sqrt(cut * c)
-        if not determinant > F(1e-12):
-            continue
-        if px + rx <= HALF or px - rx >= width - HALF or py + ry <= HALF or py - ry >= height - HALF:
-            continue
         inverse = ONE / determinant
-        conic_a, conic_b, conic_c = c * inverse, -b * inverse, a * inverse
-        extents[i, CONIC_A], extents[i, CONIC_B], extents[i, CONIC_C] = conic_a, conic_b, conic_c
-        extents[i, CUT], extents[i, HALF_WIDTH], extents[i, HALF_HEIGHT] = cut, rx, ry
-        extents[i, DEPTH] = tz
-        dx, dy, dz = view_direction(g, cam, i)
+        opacity = sigmoid(load_some(g, LOGIT, i, inside))
+        if antialias:
+            opacity = opacity * sqrt(larger(sharp * inverse, spread(FAINTEST)))
+        log2_opacity = log2(opacity)
+        cut = (log2_opacity + MIN_ALPHA_LOG2) * (TWO / LOG2E)  # of the squared Mahalanobis distance
+        px, py = fma(cam[FX], ux, cam[CX]), fma(cam[FY], uy, cam[CY])
+        rx, ry = sqrt(cut * a), sqrt(cut * c)
+        seen = seen & (cut > ZERO) & (determinant > F(1e-12))
+        seen = seen & (px + rx > HALF) & (px - rx < width - HALF) & (py + ry > HALF) & (py - ry < height - HALF)
+        left = bits(seen)
+        if left == 0:
+            continue
+        store(depth, i, where(seen, tz, spread(ZERO)))
+        columns = smaller(floor((px + rx) * F(1 / TILE)) + ONE, across) - larger(
+            floor((px - rx - ONE) * F(1 / TILE)), spread(ZERO)
+        )
+        rows = smaller(floor((py + ry) * F(1 / TILE)) + ONE, down) - larger(
+            floor((py - ry - ONE) * F(1 / TILE)), spread(ZERO)
+        )
+        store(most, i, columns * rows)
+        dx, dy, dz = view_direction(g, cam, i, inside)
         fill_basis(degree, dx, dy, dz, basis)
-        drawn[i, X], drawn[i, Y] = px, py
-        drawn[i, A], drawn[i, B], drawn[i, C] = conic_a * (HALF * LOG2E), conic_b * LOG2E, conic_c * (HALF * LOG2E)
-        drawn[i, LOG2_OPACITY] = log2_opacity
+        store(memory, own + 16 * X, px)
+        store(memory, own + 16 * Y, py)
+        store(memory, own + 16 * A, c * inverse * (HALF * LOG2E))
+        store(memory, own + 16 * B, -(b * inverse) * LOG2E)
+        store(memory, own + 16 * C, a * inverse * (HALF * LOG2E))
+        store(memory, own + 16 * LOG2_OPACITY, log2_opacity)
         for channel in range(3):
-            drawn[i, RED + channel] = max(colour(g, i, channel, count, basis), ZERO)
+            value = larger(colour(g, i, inside, channel, count, basis), spread(ZERO))
+            store(memory, own + 16 * (RED + channel), value)
+        store(memory, own + 16 * HALF_HEIGHT, ry)
+        narrow = determinant / c
+        store(memory, own + 16 * SLOPE, -(b / c))
+        store(memory, own + 16 * SQUARE, cut * narrow)
+        store(memory, own + 16 * CURVE, narrow / c)
+        store(memory, own + 16 * WIDEST, b * rx / a)
+        while left:
+            lane = lowest(left)
+            left &= left - 1
+            for column in range(COLUMNS):
+                drawn[i + lane, column] = memory[own + 16 * column + lane]

@@ -2,20 +2,22 @@
 
 import numpy as np
 
-from .binning import Order, Slots, Tiles, fill_tiles, sort_visible
+from .binning import Order, Slots, Tiles, fill_lists, fill_slots, place_lists, place_slots, sort_visible
 from .kernels import F
 from .layout import rows
 from .options import Rendering
 from .planes import Planes
 from .projection import Splats, View, project
 from .raster import render
+from .team import Team
 
 
 class Renderer:
-    """Draws pictures of one size, of up to `capacity` Gaussians. Not for use by several threads."""
+    """Draws pictures of one size, of up to `capacity` Gaussians, with a team of its own or a trainer's."""
 
-    def __init__(self, capacity: int, width: int, height: int, rendering: Rendering):
+    def __init__(self, capacity: int, width: int, height: int, rendering: Rendering, team: Team | None = None):
         self.width, self.height, self.rendering = width, height, rendering
+        self.team = team or Team()
         self.background = np.full(3, rendering.background, np.float32)
         self.planes = Planes(width, height)
         self.padded = self.planes.zeros(3)
@@ -25,13 +27,14 @@ class Renderer:
 
     def resize(self, capacity: int) -> None:
         """Makes room for so many Gaussians."""
-        self.splats = Splats.zeros(capacity)
-        self.order = Order.zeros(capacity)
+        self.capacity = 16 * -(-max(capacity, 1) // 16)
+        self.splats = Splats.zeros(self.capacity)
+        self.order = Order.zeros(self.capacity)
         self._make_room(max(65536, 8 * capacity))
 
     def _make_room(self, pairs: int) -> None:
-        self.slots = Slots.zeros(len(self.splats.drawn), pairs)
-        self.tiles = Tiles.zeros(self.width, self.height, pairs)
+        self.slots = Slots.zeros(self.capacity, pairs)
+        self.tiles = Tiles.zeros(self.width, self.height, pairs, self.team.parts)
 
     def view(self, camera: np.ndarray) -> View:
         """How a camera (21,) sees Gaussians here."""
@@ -44,15 +47,23 @@ class Renderer:
         if len(gaussians) != wanted:
             # The kernels check no bounds: beyond them is other memory.
             raise ValueError(f"{len(gaussians)} rows of parameters, made for {wanted}")
-        if n > len(self.splats.drawn):
-            raise ValueError(f"{n} Gaussians, made for at most {len(self.splats.drawn)}; resize the renderer")
-        project(gaussians, self.view(camera), self.splats)
-        visible = sort_visible(n, self.splats.extents, self.order)
-        while True:
-            self.slots.number[:n] = 0
-            self.pairs = fill_tiles(visible, self.order, self.splats, self.slots, self.tiles)
-            if self.pairs >= 0:
-                break
-            self._make_room(2 * len(self.tiles.lists))
-        render(self.splats.drawn, self.slots, self.tiles, self.background, self.image)
+        if n > self.capacity:
+            raise ValueError(f"{n} Gaussians, made for at most {self.capacity}; resize the renderer")
+        view, splats, order, team = self.view(camera), self.splats, self.order, self.team
+        team.each(lambda first, last: project(gaussians, view, splats, first, last), team.blocks(n))
+        visible = sort_visible(n, splats.depth.view(np.uint32), order)
+        room = place_slots(visible, order, splats.most, self.slots)
+        if room > len(self.tiles.lists):
+            self._make_room(room + room // 2)
+            place_slots(visible, order, splats.most, self.slots)
+        slots, tiles = self.slots, self.tiles
+        parts = [(part, *ends) for part, ends in enumerate(team.blocks(visible, 1))]
+        used = tiles._replace(counts=tiles.counts[: len(parts)])
+        team.each(lambda *part: fill_slots(order, splats.drawn, slots, used, *part), parts)
+        self.pairs = place_lists(used)
+        team.each(lambda *part: fill_lists(order, slots, used, *part), parts)
+        team.each(
+            lambda first, last: render(splats.drawn, slots, tiles, self.background, self.image, first, last),
+            team.shares(tiles.starts),
+        )
         return self.image

@@ -7,10 +7,11 @@ import numpy as np
 from .backward import Moments, Rates, adam, project_backward, regularise
 from .kernels import F
 from .layout import rows
-from .loss import Target, Workspace, loss
+from .loss import Target, Workspace, compare, descend, loss
 from .options import Rendering
 from .raster import PAIR_COLUMNS, render_backward
 from .renderer import Renderer
+from .team import Team
 
 
 class Weights(NamedTuple):
@@ -22,10 +23,11 @@ class Weights(NamedTuple):
 
 
 class Trainer:
-    """Trains on pictures of one size, up to `capacity` Gaussians. Not for use by several threads."""
+    """Trains on pictures of one size, up to `capacity` Gaussians, with a team of threads."""
 
-    def __init__(self, capacity: int, width: int, height: int, rendering: Rendering):
-        self.renderer = Renderer(capacity, width, height, rendering)
+    def __init__(self, capacity: int, width: int, height: int, rendering: Rendering, team: Team | None = None):
+        self.team = team or Team()
+        self.renderer = Renderer(capacity, width, height, rendering, self.team)
         planes = self.renderer.planes
         self.workspace = Workspace.of(planes)
         self.padded_gradient = planes.zeros(3)
@@ -39,12 +41,16 @@ class Trainer:
 
     def compare(self, target: Target, ssim_weight: float) -> float:
         """The loss of the picture drawn last; sets `image_gradient`."""
-        return loss(self.renderer.padded, target, F(ssim_weight), self.workspace, self.padded_gradient)
+        picture, weight, work, out = self.renderer.padded, F(ssim_weight), self.workspace, self.padded_gradient
+        ranges = self.team.rows(work.height)
+        self.team.each(lambda first, last: compare(picture, target, weight, work, first, last), ranges)
+        self.team.each(lambda first, last: descend(picture, target, weight, work, out, first, last), ranges)
+        return loss(work, ssim_weight)
 
     def differentiate(self, gaussians: np.ndarray, camera: np.ndarray) -> np.ndarray:
-        """(rows, capacity) gradient of what `image_gradient` was set to, for the picture that was drawn last."""
+        """(rows, N) gradient of what `image_gradient` was set to, for the picture that was drawn last."""
         r, n = self.renderer, gaussians.shape[1]
-        capacity, pairs = len(r.splats.drawn), len(r.slots.tile)
+        capacity, pairs = r.capacity, len(r.slots.tile)
         if n > capacity or len(gaussians) != len(self.gradient):
             raise ValueError(f"the picture was not drawn of these {n} Gaussians; draw it first")
         # The renderer makes room as it needs it, and the kernels check no bounds.
@@ -52,9 +58,17 @@ class Trainer:
             self.gradient = np.zeros((len(self.gradient), capacity), np.float32)
         if len(self.pair_gradient) != pairs:
             self.pair_gradient = np.zeros((pairs, PAIR_COLUMNS), np.float32)
-        render_backward(r.splats.drawn, r.slots, r.tiles, r.image, self.image_gradient, self.pair_gradient)
-        project_backward(gaussians, r.view(camera), r.slots, self.pair_gradient, self.gradient)
-        return self.gradient
+        drawn, slots, tiles, view = r.splats.drawn, r.slots, r.tiles, r.view(camera)
+        image, by_image, by_pair, out = r.image, self.image_gradient, self.pair_gradient, self.gradient
+        self.team.each(
+            lambda first, last: render_backward(drawn, slots, tiles, image, by_image, by_pair, first, last),
+            self.team.shares(tiles.starts),
+        )
+        self.team.each(
+            lambda first, last: project_backward(gaussians, view, slots, by_pair, out, first, last),
+            self.team.blocks(n),
+        )
+        return out[:, :n]
 
     def step(
         self,
@@ -68,8 +82,10 @@ class Trainer:
         """One step of training on one view, which moves `gaussians` and `moments`; returns the loss."""
         self.renderer.draw(gaussians, camera)
         value = self.compare(target, weights.ssim)
-        gradient = self.differentiate(gaussians, camera)
-        if weights.opacity or weights.scale:
-            regularise(gaussians, F(weights.opacity), F(weights.scale), gradient)
-        adam(gaussians, gradient, moments, rates)
+        self.differentiate(gaussians, camera)
+        gradient = self.gradient
+        opacity, scale, ranges = F(weights.opacity), F(weights.scale), self.team.blocks(gaussians.shape[1])
+        if opacity or scale:
+            self.team.each(lambda *ends: regularise(gaussians, opacity, scale, gradient, *ends), ranges)
+        self.team.each(lambda *ends: adam(gaussians, gradient, moments, rates, *ends), ranges)
         return value

@@ -11,7 +11,7 @@ from tests.conftest import known
 from viewbench.backends.splat import layout
 from viewbench.backends.splat.backward import Moments, Rates
 from viewbench.backends.splat.options import Rendering
-from viewbench.backends.splat.projection import CUT, camera_vectors
+from viewbench.backends.splat.projection import camera_vectors
 from viewbench.backends.splat.renderer import Renderer
 from viewbench.backends.splat.trainer import Trainer, Weights
 from viewbench.scenes.types import Cameras
@@ -214,7 +214,7 @@ def test_splats_at_one_depth():
     g[0:3] = g[0:3, :1]
     renderer = Renderer(30, 32, 32, Rendering(NEAR))
     renderer.draw(g, cam)
-    assert (renderer.slots.number > 0).sum() == (renderer.splats.extents[:, CUT] > 0).sum()
+    assert (renderer.slots.number > 0).sum() == (renderer.splats.depth > 0).sum()
 
 
 def test_the_filter_keeps_a_small_splats_light():

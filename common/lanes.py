@@ -1,0 +1,409 @@
+"""Sixteen float32 at a time: vectors as values in compiled code, with the same bits on every machine.
+
+A kernel that names its vectors needs no luck with what a compiler finds in a loop, and says itself in which order it
+adds. Arithmetic is IEEE's and nothing is contracted but by `fma`; the processor's own width does not matter: what is
+wider than it is done in parts. Values of type LANES live in kernels alone and cannot be passed to or from Python.
+
+`a + b`, `a - b`, `a * b`, `a / b`, `-a` take lanes and scalars; comparisons give a MASK, which `&` and `|` join.
+"""
+
+import operator
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+
+from .kernels import numba, written
+
+intrinsic: Any = numba.extending.intrinsic  # the function that it makes takes no typing context
+types, templates = numba.core.types, numba.core.typing.templates
+register_model = numba.extending.register_model
+lower_builtin, lower_cast = numba.extending.lower_builtin, numba.extending.lower_cast
+models = numba.extending.models
+
+COUNT = 16
+_FLOAT, _INT = ir.FloatType(), ir.IntType(32)
+_VECTOR, _INTS, _BITS = ir.VectorType(_FLOAT, COUNT), ir.VectorType(_INT, COUNT), ir.VectorType(ir.IntType(1), COUNT)
+
+
+class _Lanes(types.Type):
+    def __init__(self):
+        super().__init__(name="Lanes")
+
+
+class _Mask(types.Type):
+    def __init__(self):
+        super().__init__(name="Mask")
+
+
+LANES, MASK = _Lanes(), _Mask()
+
+
+@register_model(_Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, dmm, fe_type):
+        super().__init__(dmm, fe_type, _VECTOR)
+
+
+@register_model(_Mask)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, dmm, fe_type):
+        super().__init__(dmm, fe_type, _BITS)
+
+
+def _constant(vector_type, values):
+    return ir.Constant(vector_type, [ir.Constant(vector_type.element, value) for value in values])
+
+
+def _spread(builder, scalar):
+    first = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), scalar, ir.Constant(_INT, 0))
+    return builder.shuffle_vector(first, ir.Constant(_VECTOR, ir.Undefined), _constant(_INTS, [0] * COUNT))
+
+
+@lower_cast(types.Float, LANES)
+@lower_cast(types.Integer, LANES)
+def _cast(context, builder, fromty, toty, value):
+    return _spread(builder, context.cast(builder, value, fromty, types.float32))
+
+
+def _operator(function, result, build, operands=2):
+    """Gives a Python operator a meaning for lanes, or for masks."""
+
+    @templates.infer_global(function)
+    class _Typing(templates.AbstractTemplate):
+        def generic(self, args, kws):
+            kind = MASK if build in (ir.IRBuilder.and_, ir.IRBuilder.or_) else LANES
+            scalars = () if kind == MASK else (types.Float, types.Integer)
+            if len(args) == operands and kind in args and all(a == kind or isinstance(a, scalars) for a in args):
+                return templates.signature(result, *[kind] * operands)
+            return None
+
+    @lower_builtin(function, *[MASK if build in (ir.IRBuilder.and_, ir.IRBuilder.or_) else LANES] * operands)
+    def _lowered(context, builder, sig, args):
+        return build(builder, *args)
+
+
+for _function, _build in (
+    (operator.add, ir.IRBuilder.fadd),
+    (operator.sub, ir.IRBuilder.fsub),
+    (operator.mul, ir.IRBuilder.fmul),
+    (operator.truediv, ir.IRBuilder.fdiv),
+):
+    _operator(_function, LANES, _build)
+_operator(operator.neg, LANES, ir.IRBuilder.fneg, operands=1)
+for _function, _sign in ((operator.lt, "<"), (operator.gt, ">"), (operator.le, "<="), (operator.ge, ">=")):
+    _operator(_function, MASK, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
+_operator(operator.and_, MASK, ir.IRBuilder.and_)
+_operator(operator.or_, MASK, ir.IRBuilder.or_)
+
+
+def _call(builder, name, result, args):
+    function = builder.module.declare_intrinsic(name, (), ir.FunctionType(result, [a.type for a in args]))
+    return builder.call(function, args)
+
+
+def _place(context, builder, sig, args, array, indices):
+    """Address of an element of an array."""
+    if sig.args[array].layout != "C" or sig.args[array].dtype != types.float32:
+        raise numba.core.errors.TypingError(f"lanes are of contiguous float32, not of {sig.args[array]}")
+    made = context.make_array(sig.args[array])(context, builder, args[array])
+    whole = [context.cast(builder, args[i], sig.args[i], types.intp) for i in indices]
+    offset = whole[0]
+    if len(whole) == 2:
+        columns = builder.extract_value(made.shape, 1)
+        offset = builder.add(builder.mul(offset, columns), whole[1])
+    return builder.gep(made.data, [offset])
+
+
+def _as_vector(builder, address):
+    return builder.bitcast(address, _VECTOR.as_pointer())
+
+
+@intrinsic
+def spread(typingctx, scalar):
+    """The scalar in every lane."""
+    return LANES(scalar), lambda context, builder, sig, args: _cast(context, builder, sig.args[0], LANES, args[0])
+
+
+@intrinsic
+def load(typingctx, array, i):
+    """16 elements of a one-dimensional array, from i on."""
+
+    def build(context, builder, sig, args):
+        return builder.load(_as_vector(builder, _place(context, builder, sig, args, 0, (1,))), align=4)
+
+    return LANES(array, i), build
+
+
+@intrinsic
+def load_row(typingctx, array, row, column):
+    """16 elements of a row of a two-dimensional array, from `column` on."""
+
+    def build(context, builder, sig, args):
+        return builder.load(_as_vector(builder, _place(context, builder, sig, args, 0, (1, 2))), align=4)
+
+    return LANES(array, row, column), build
+
+
+@intrinsic
+def load_some(typingctx, array, row, column, mask):
+    """Those elements of 16 of a row that the mask names, and 0; nothing else is touched."""
+
+    def build(context, builder, sig, args):
+        address = _as_vector(builder, _place(context, builder, sig, args, 0, (1, 2)))
+        arguments = [address, ir.Constant(_INT, 4), args[3], _constant(_VECTOR, [0.0] * COUNT)]
+        kind = ir.FunctionType(_VECTOR, [a.type for a in arguments])
+        return builder.call(builder.module.declare_intrinsic("llvm.masked.load.v16f32.p0", (), kind), arguments)
+
+    return LANES(array, row, column, mask), build
+
+
+@intrinsic
+def store(typingctx, array, i, value):
+    """Writes 16 elements of a one-dimensional array."""
+
+    def build(context, builder, sig, args):
+        builder.store(args[2], _as_vector(builder, _place(context, builder, sig, args, 0, (1,))), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, i, LANES), build
+
+
+@intrinsic
+def store_row(typingctx, array, row, column, value):
+    """Writes 16 elements of a row of a two-dimensional array."""
+
+    def build(context, builder, sig, args):
+        builder.store(args[3], _as_vector(builder, _place(context, builder, sig, args, 0, (1, 2))), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, row, column, LANES), build
+
+
+@intrinsic
+def store_some(typingctx, array, row, column, value, mask):
+    """Writes those of 16 elements of a row that the mask names."""
+
+    def build(context, builder, sig, args):
+        address = _as_vector(builder, _place(context, builder, sig, args, 0, (1, 2)))
+        arguments = [args[3], address, ir.Constant(_INT, 4), args[4]]
+        kind = ir.FunctionType(ir.VoidType(), [a.type for a in arguments])
+        builder.call(builder.module.declare_intrinsic("llvm.masked.store.v16f32.p0", (), kind), arguments)
+        return context.get_dummy_value()
+
+    return types.void(array, row, column, LANES, mask), build
+
+
+@intrinsic
+def fma(typingctx, a, b, c):
+    """a b + c, rounded once."""
+    sig = LANES(LANES, LANES, LANES)
+    return sig, lambda context, builder, sig, args: _call(builder, "llvm.fma.v16f32", _VECTOR, args)
+
+
+@intrinsic
+def sqrt(typingctx, a):
+    """Square root."""
+    return LANES(LANES), lambda context, builder, sig, args: _call(builder, "llvm.sqrt.v16f32", _VECTOR, args)
+
+
+@intrinsic
+def floor(typingctx, a):
+    """Largest whole number that is not larger."""
+    return LANES(LANES), lambda context, builder, sig, args: _call(builder, "llvm.floor.v16f32", _VECTOR, args)
+
+
+@intrinsic
+def magnitude(typingctx, a):
+    """Absolute value."""
+    return LANES(LANES), lambda context, builder, sig, args: _call(builder, "llvm.fabs.v16f32", _VECTOR, args)
+
+
+@intrinsic
+def smaller(typingctx, a, b):
+    """The smaller of each two; b where one is NaN."""
+
+    def build(context, builder, sig, args):
+        return builder.select(builder.fcmp_ordered("<", *args), *args)
+
+    return LANES(LANES, LANES), build
+
+
+@intrinsic
+def larger(typingctx, a, b):
+    """The larger of each two; b where one is NaN."""
+
+    def build(context, builder, sig, args):
+        return builder.select(builder.fcmp_ordered(">", *args), *args)
+
+    return LANES(LANES, LANES), build
+
+
+@intrinsic
+def where(typingctx, mask, a, b):
+    """a in the lanes that the mask names, b in the others."""
+    return LANES(MASK, LANES, LANES), lambda context, builder, sig, args: builder.select(*args)
+
+
+@intrinsic
+def bits(typingctx, mask):
+    """The mask as a whole number, lane 0 its lowest bit; 0 where it names none."""
+
+    def build(context, builder, sig, args):
+        return builder.zext(builder.bitcast(args[0], ir.IntType(COUNT)), ir.IntType(64))
+
+    return types.int64(MASK), build
+
+
+@intrinsic
+def lowest(typingctx, number):
+    """Place of the lowest bit that is set in an int64 that is not 0."""
+
+    def build(context, builder, sig, args):
+        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 1))
+
+    return types.int64(types.int64), build
+
+
+@intrinsic
+def numbers(typingctx):
+    """0, 1, ... 15."""
+    return LANES(), lambda context, builder, sig, args: _constant(_VECTOR, [float(i) for i in range(COUNT)])
+
+
+@intrinsic
+def times_power(typingctx, a, shifted):
+    """a 2^n, where `shifted` is n + 1.5 · 2²³ in floating point: its lowest bits are n."""
+
+    def build(context, builder, sig, args):
+        power = builder.shl(builder.bitcast(args[1], _INTS), _constant(_INTS, [23] * COUNT))
+        return builder.bitcast(builder.add(builder.bitcast(args[0], _INTS), power), _VECTOR)
+
+    return LANES(LANES, LANES), build
+
+
+@intrinsic
+def exponent(typingctx, a):
+    """Whole part of log2 of positive normal numbers."""
+
+    def build(context, builder, sig, args):
+        raised = builder.lshr(builder.bitcast(args[0], _INTS), _constant(_INTS, [23] * COUNT))
+        return builder.sitofp(builder.sub(raised, _constant(_INTS, [127] * COUNT)), _VECTOR)
+
+    return LANES(LANES), build
+
+
+@intrinsic
+def mantissa(typingctx, a):
+    """Positive normal numbers, divided by 2^exponent: in [1, 2)."""
+
+    def build(context, builder, sig, args):
+        kept = builder.and_(builder.bitcast(args[0], _INTS), _constant(_INTS, [0x007FFFFF] * COUNT))
+        return builder.bitcast(builder.or_(kept, _constant(_INTS, [0x3F800000] * COUNT)), _VECTOR)
+
+    return LANES(LANES), build
+
+
+@intrinsic(prefer_literal=True)
+def shifted(typingctx, a, b, by):
+    """The 16 lanes from `by` on of a and b one behind the other; `by` is a literal."""
+    first = by.literal_value
+
+    def build(context, builder, sig, args):
+        return builder.shuffle_vector(args[0], args[1], _constant(_INTS, range(first, first + COUNT)))
+
+    return LANES(LANES, LANES, by), build
+
+
+@intrinsic
+def sums(typingctx, vectors):
+    """Lane j is the sum of the lanes of vector j of a tuple of at most 16, the others 0; halves are added to halves."""
+    count = len(vectors)
+
+    def build(context, builder, sig, args):
+        zero = _constant(_VECTOR, [0.0] * COUNT)
+        left = [builder.extract_value(args[0], j) for j in range(count)] + [None] * (COUNT - count)
+        width = COUNT // 2
+        while width:
+            left = [_folded(builder, left[j], left[j + width], width, zero) for j in range(width)]
+            width //= 2
+        return left[0]
+
+    return LANES(vectors), build
+
+
+def _folded(builder, a, b, width, zero):
+    """Of groups of 2 `width` lanes, the halves added; the group of b goes behind that of a."""
+    if a is None:
+        return None
+    b = zero if b is None else b
+    low, high = [], []
+    for group in range(0, COUNT, 2 * width):
+        for vector in (0, COUNT):
+            low += range(vector + group, vector + group + width)
+            high += range(vector + group + width, vector + group + 2 * width)
+    return builder.fadd(
+        builder.shuffle_vector(a, b, _constant(_INTS, low)), builder.shuffle_vector(a, b, _constant(_INTS, high))
+    )
+
+
+@written
+def aligned(array):
+    """The first place of a float32 array at which a vector lies in one cache line; `array` has 16 elements to spare."""
+    return (-(array.ctypes.data >> 2)) & (COUNT - 1)
+
+
+# 2^f on [-½, ½], the minimax polynomial: relative error 1e-7 and what rounding adds.
+_P0, _P1, _P2, _P3, _P4, _P5 = (
+    np.float32(c) for c in (1.0, 0.69314698, 0.24022242, 0.055507337, 0.0096715126, 0.0013264727)
+)
+_MAGIC = np.float32(1.5 * 2**23)
+_ROOT2 = np.float32(2**0.5)
+_L1, _L3, _L5, _L7, _L9 = (np.float32(2 / np.log(2) / k) for k in (1, 3, 5, 7, 9))
+_LOG2E = np.float32(1.4426950408889634)
+
+
+@written
+def exp2(x):
+    """2^x for x in [-126, 126]."""
+    magic = x + _MAGIC
+    f = x - (magic - _MAGIC)
+    p = fma(f, spread(_P5), spread(_P4))
+    p = fma(f, p, spread(_P3))
+    p = fma(f, p, spread(_P2))
+    p = fma(f, p, spread(_P1))
+    return times_power(fma(f, p, spread(_P0)), magic)
+
+
+@written
+def exp(x):
+    """e^x for x in [-22, 22], and clamped to it: 3e-10 to 4e9, which can be squared."""
+    return exp2(smaller(larger(x * _LOG2E, spread(np.float32(-32))), spread(np.float32(32))))
+
+
+@written
+def log2(x):
+    """log2 of positive normal numbers, by the series of the inverse hyperbolic tangent; error below 2e-7 · |log2 x|."""
+    m = mantissa(x)
+    high = m > _ROOT2
+    m = where(high, m * np.float32(0.5), m)
+    e = exponent(x) + where(high, spread(np.float32(1)), spread(np.float32(0)))
+    s = (m - np.float32(1)) / (m + np.float32(1))
+    z = s * s
+    p = fma(z, spread(_L9), spread(_L7))
+    p = fma(z, p, spread(_L5))
+    p = fma(z, p, spread(_L3))
+    p = fma(z, p, spread(_L1))
+    return fma(s, p, e)
+
+
+@written
+def dot(a0, b0, a1, b1, a2, b2):
+    """a₀ b₀ + a₁ b₁ + a₂ b₂."""
+    return fma(a0, b0, fma(a1, b1, a2 * b2))
+
+
+@written
+def sigmoid(x):
+    """1 / (1 + e^-x)."""
+    return np.float32(1) / (np.float32(1) + exp(-x))
