@@ -60,3 +60,6 @@ FAST: Any = {
 compiled = njit(cache=True, **FAST)
 inlined = njit(inline="always", **FAST)
 strict = njit(cache=True)  # arithmetic as Python has it, in the order in which it is written
+# In the order in which it is written too, so the same bits on every machine, but a division by zero gives infinity:
+# loops without sums run as vectors.
+exact = njit(cache=True, error_model="numpy", boundscheck=False, nogil=True)

@@ -18,7 +18,7 @@ MODULES = {
     for folder in CODE
     for path in sorted((PACKAGE / folder).rglob("*.py"))
 }
-DECORATORS = {"compiled", "inlined", "strict"}
+DECORATORS = {"compiled", "inlined", "strict", "exact"}
 
 
 def python(code, **variables):
@@ -153,7 +153,7 @@ print(signatures())
 """
     warm, trained = (ast.literal_eval(line) for line in python(code).splitlines()[-2:])
     called = ["project", "sort_visible", "fill_tiles", "render", "loss", "render_backward", "project_backward"]
-    called += ["regularise", "adam", "sweep", "observe", "observers", "add"]
+    called += ["regularise", "adam", "_sweep", "observe", "observers", "add"]
     assert {name: warm[name] for name in called} == dict.fromkeys(called, 1)
     assert trained == warm
     assert max(trained.values()) == 1
