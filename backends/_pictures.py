@@ -50,8 +50,8 @@ class Pictures:
     def _write(self, picture: Picture, place: int) -> None:
         try:
             if self._file is None:
-                self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)
-            left = memoryview(np.ascontiguousarray(picture.numbers)).cast("B")
+                self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115 - `close` closes it
+            left = np.ascontiguousarray(picture.numbers).data.cast("B")
             at = place
             while len(left):
                 written = os.pwrite(self._file.fileno(), left, at)
@@ -78,7 +78,7 @@ class Pictures:
             return self._kept[index].pixels()
         place, kind, one = self._places[index - len(self._kept)]
         numbers = np.empty(self._size, kind)
-        left = memoryview(numbers).cast("B")
+        left = numbers.data.cast("B")
         while len(left):
             read = os.preadv(self._file.fileno(), [left], place)
             if not read:

@@ -13,7 +13,7 @@ from .types import Cameras, Split
 
 
 class Picture(NamedTuple):
-    """A picture in the smallest numbers that hold it exactly: 3 bytes a pixel of its own size, 6 of a mean of blocks."""
+    """A picture in the smallest numbers that hold it exactly: 3 bytes a pixel as it was, 6 as a mean of blocks."""
 
     numbers: np.ndarray  # (H, W, 3) uint8, uint16 or float32
     one: int  # the number that stands for 1
@@ -24,7 +24,10 @@ class Picture(NamedTuple):
 
 
 def load_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[np.ndarray, Cameras]:
-    """(K, H, W, 3) float32 RGB in [0, 1] of the frames at `indices`, all at once, and their cameras: see `read_images`."""
+    """(K, H, W, 3) float32 RGB in [0, 1] of the frames at `indices`, all at once, and their cameras.
+
+    See `read_images`.
+    """
     read, cameras = read_images(split, indices, width)
     images = np.empty((len(cameras), int(cameras.height[0]), int(cameras.width[0]), 3), np.float32)
     for image, picture in zip(images, read, strict=True):
@@ -51,10 +54,17 @@ def read_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[I
 
 
 def _read_all(paths: list[Path], full: Cameras, cameras: Cameras) -> Iterator[Picture]:
+    lens, where = b"", np.zeros(0)
     for path, before, camera in zip(paths, full, cameras, strict=True):
         size = (int(camera.width[0]), int(camera.height[0]))
         picture = _shrunk(_read(path, (int(before.width[0]), int(before.height[0]))), size)
-        yield picture if camera.distortion is None else Picture(_undistorted(picture.pixels(), camera), 1)
+        if camera.distortion is not None:
+            # Most captures have one camera, and finding where its lens looks takes as long as the rest.
+            same = b"".join(value.tobytes() for name, value in vars(camera).items() if name != "c2w")
+            if same != lens:
+                lens, where = same, _distorted(camera)
+            picture = Picture(_sampled(picture.pixels(), where), 1)
+        yield picture
 
 
 def _read(path: Path, expected: tuple[int, int]) -> np.ndarray:
@@ -103,22 +113,27 @@ def _sums(rgb: np.ndarray, across: int, down: int) -> Picture:
     return Picture(sums, one) if kind is np.uint16 else Picture((sums / one).astype(np.float32), 1)
 
 
-def _undistorted(pixels: np.ndarray, camera: Cameras) -> np.ndarray:
-    """The picture that a pinhole with the same focal lengths and centre would see.
+def _distorted(camera: Cameras) -> np.ndarray:
+    """(2, H, W) float64 row and column, from the first pixel's centre, where the camera sees a pinhole's pixels.
 
-    OpenCV's model: x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²), y' likewise; sampled bilinearly.
+    The pinhole has the same focal lengths and centre. OpenCV's model:
+    x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²), y' likewise.
     """
-    from scipy.ndimage import map_coordinates
-
     assert camera.distortion is not None
     k1, k2, p1, p2, k3 = camera.distortion[0]
     fx, fy, cx, cy = camera.fx[0], camera.fy[0], camera.cx[0], camera.cy[0]
-    v, u = np.mgrid[: pixels.shape[0], : pixels.shape[1]] + 0.5
+    v, u = np.mgrid[: int(camera.height[0]), : int(camera.width[0])] + 0.5
     x, y = (u - cx) / fx, (v - cy) / fy
     r2 = x * x + y * y
     radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
     xd = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
     yd = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    where = np.stack([yd * fy + cy - 0.5, xd * fx + cx - 0.5])
+    return np.stack([yd * fy + cy - 0.5, xd * fx + cx - 0.5])
+
+
+def _sampled(pixels: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(H, W, 3) float32, bilinearly."""
+    from scipy.ndimage import map_coordinates
+
     channels = [map_coordinates(pixels[..., c], where, order=1, mode="nearest") for c in range(3)]
     return np.stack(channels, axis=-1)

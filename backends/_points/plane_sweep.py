@@ -184,9 +184,12 @@ def sweep(
     size = padded.size
     work = Work(
         padded.ravel(),
-        *(np.zeros((planes, size), np.float32) for planes in (3, 6, 2, 5)),
-        np.zeros(width, np.int32),
-        np.zeros((3, width), np.float32),
+        warped=np.zeros((3, size), np.float32),
+        sums=np.zeros((6, size), np.float32),
+        best=np.zeros((2, size), np.float32),
+        top=np.zeros((5, size), np.float32),
+        corner=np.zeros(width, np.int32),
+        share=np.zeros((3, width), np.float32),
     )
     flat = np.zeros((len(sources), height * width), np.float32)
     flat[:] = (sources - HALF).reshape(len(sources), -1)
