@@ -23,7 +23,7 @@ KEPT_BYTES = 512 << 20  # of pictures in memory
 class Pictures:
     """K pictures of one size, as `images` of a TrainingSet; to be closed, which `with` does."""
 
-    def __init__(self, pictures: Iterable[Picture], shape: tuple[int, int, int], folder: Path, kept: int = KEPT_BYTES):
+    def __init__(self, pictures: Iterable[Picture], shape: tuple[int, int, int], folder: Path, kept: int):
         """Reads all of them, of `shape` (H, W, 3), with at most `kept` bytes in memory and the rest in `folder`.
 
         Raises UserError where the folder has no room for it.

@@ -27,7 +27,7 @@ from ..scenes.types import Cameras, Scene
 from ..selectors._selection import check_selection, selection_sha256
 from . import _registry
 from ._memory import peak_rss_bytes
-from ._pictures import Pictures
+from ._pictures import KEPT_BYTES, Pictures
 from ._psnr import psnr_db
 from ._types import SOURCES, WITHOUT, Budget, Job, Probe, Report, Trained, TrainingSet
 
@@ -85,7 +85,7 @@ def train(
     work = _work_folder(out, asked, resumes=backend.CAPABILITIES.resumes)
     try:
         report = Report(progress=progress, probe=_probe(scene, job.width) if job.curve and len(scene.test) else None)
-        with Pictures(read, (int(cameras.height[0]), int(cameras.width[0]), 3), work) as images:
+        with Pictures(read, (int(cameras.height[0]), int(cameras.width[0]), 3), work, KEPT_BYTES) as images:
             data = TrainingSet(
                 scene=scene.name,
                 names=views.names,

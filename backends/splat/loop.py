@@ -22,7 +22,7 @@ from .projection import camera_vectors
 from .relocate import relocate
 from .renderer import Renderer
 from .snapshot import State
-from .stages import TARGETS, Stage, halved
+from .stages import Stage, halved
 from .trainer import Weights
 
 CURVE_POINTS = 10
@@ -47,7 +47,7 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
     if views < 2 and not (seeding.scene_points or seeding.random_points):
         raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
     rendering = Rendering(o.near * around.nearest, o.background, o.sh_degree, o.low_pass, o.antialias)
-    full = Stage(data.images, data.cameras, gaussians.shape[1], rendering, TARGETS)
+    full = Stage(data.images, data.cameras, gaussians.shape[1], rendering)
     coarse = halved(data, gaussians.shape[1], rendering) if o.coarse else None
     first_rates, last = _rates(o, around.extent)
     weights = Weights(o.ssim, o.opacity_weight / gaussians.shape[1], o.scale_weight / gaussians.shape[1])

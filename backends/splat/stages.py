@@ -15,23 +15,21 @@ from .projection import camera_vectors
 from .trainer import Trainer
 
 SMALLEST = 80  # pixels: geometric mean of the sides that halved pictures must have
-
-
-TARGETS = 512 << 20  # bytes of targets that are kept; those of other views are made when their turn comes
+# Bytes of targets that are kept, a quarter of them for half the size. Those of other views are made when they come up,
+# in a small part of the time of a step.
+TARGETS = 512 << 20
 
 
 class Stage:
     """Training views of one size, `factor` times smaller than K pictures (K, H, W, 3), as the trainer takes them."""
 
-    def __init__(
-        self, images: Images, cameras: Cameras, count: int, rendering: Rendering, kept: int = TARGETS, factor: int = 1
-    ):
+    def __init__(self, images: Images, cameras: Cameras, count: int, rendering: Rendering, factor: int = 1):
         self.trainer = Trainer(count, images.shape[2] // factor, images.shape[1] // factor, rendering)
         self.cameras = camera_vectors(cameras)
         self._images, self._factor = images, factor
         planes = self.trainer.renderer.planes
         self._other = Target.zeros(planes)
-        views = min(len(images), kept // self._other.nbytes)
+        views = min(len(images), TARGETS // factor**2 // self._other.nbytes)
         self._kept = [self._filled(Target.zeros(planes), view) for view in range(views)]
 
     def target(self, view: int) -> Target:
@@ -47,4 +45,4 @@ def halved(data: TrainingSet, count: int, rendering: Rendering) -> Stage | None:
     _, height, width, _ = data.images.shape
     if math.sqrt((height // 2) * (width // 2)) < SMALLEST:
         return None
-    return Stage(data.images, cameras_shrunk(data.cameras, 2), count, rendering, TARGETS // 4, factor=2)
+    return Stage(data.images, cameras_shrunk(data.cameras, 2), count, rendering, factor=2)
