@@ -79,7 +79,7 @@ def _read(path: Path, expected: tuple[int, int]) -> np.ndarray:
             image_rgb = Image.new("RGB", layered.size, "white")
             image_rgb.paste(layered, mask=layered.getchannel("A"))
         else:
-            image_rgb = image.convert("RGB")
+            image_rgb = image if image.mode == "RGB" else image.convert("RGB")  # which copies
         return np.asarray(image_rgb)
 
 
