@@ -62,7 +62,7 @@ def _place(h, y, z, width, height, corner, share):
 
 @exact
 def _warp(source, homography, depth, width, height, work):
-    """The source (H · W,) as the reference view would see it, if everything lay at `depth`."""
+    """The source, H · W greys and W + 2 zeros, as the reference view would see it, if everything lay at `depth`."""
     stride = width + 2 * PATCH
     w = np.uint64(width)
     corner, share = work.corner, work.share
@@ -191,7 +191,8 @@ def sweep(
         corner=np.zeros(width, np.int32),
         share=np.zeros((3, width), np.float32),
     )
-    flat = np.zeros((len(sources), height * width), np.float32)
-    flat[:] = (sources - HALF).reshape(len(sources), -1)
+    # Four neighbours are read of what lies outside too, and a picture of one pixel has none.
+    flat = np.zeros((len(sources), height * width + width + 2), np.float32)
+    flat[:, : height * width] = (sources - HALF).reshape(len(sources), -1)
     step = float(np.log(depths[-1] / depths[0])) / max(1, len(depths) - 1)
     _sweep(flat, homographies, depths, step, work, depth, score)

@@ -1,6 +1,9 @@
 """The sweep's kernels against the definition, pixel by pixel in double precision."""
 
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -128,3 +131,33 @@ def test_witnesses_are_counted_where_they_found_the_same_depth():
     count = np.zeros(len(points), np.int64)
     agreeing(points, np.arange(3), np.tile(projection, (3, 1, 1)), w2c, depth, 0.06, count)
     assert count.tolist() == [1, 1, 0, 0, 0, 0]
+
+
+BITS = """
+import hashlib
+import numpy as np
+from viewbench.backends._points.agreement import agreeing
+from viewbench.backends._points.plane_sweep import sweep
+from viewbench.backends.splat.loss import Target
+from viewbench.backends.splat.planes import Planes
+rng = np.random.default_rng(0)
+views = rng.uniform(0, 1, (4, 33, 47)).astype(np.float32)
+depth, score = np.zeros((1, 33, 47), np.float32), np.zeros((33, 47), np.float32)
+h = np.eye(3, 4) + rng.normal(size=(3, 3, 4)) * [[[1e-2], [1e-2], [1e-4]]]
+sweep(views[0], views[1:], h, np.geomspace(0.5, 8, 48), depth[0], score)
+count = np.zeros(500, np.int64)
+points = rng.uniform(0, 20, (500, 3))
+agreeing(points, np.zeros(1, np.int64), h[:1], np.eye(4)[None], depth, 0.5, count)
+made = [depth, score, count, *Target.of(rng.uniform(0, 1, (33, 47, 3)).astype(np.float32), Planes(47, 33))]
+print(hashlib.sha256(b"".join(array.tobytes() for array in made)).hexdigest(), int(count.sum() > 0))
+"""
+
+
+def test_another_processor_finds_the_same_bits(tmp_path):
+    """One without vectors of this one's width, and without fused multiplications."""
+    found = set()
+    for variables in ({}, {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / str(len(variables))), **variables}
+        found.add(subprocess.check_output([sys.executable, "-c", BITS], text=True, env=environment))
+    assert len(found) == 1
+    assert found.pop().endswith(" 1\n")
