@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test lint types pytest bench gpu quality external format clean clean-results
+.PHONY: help setup dev reports dashboard test lint types pytest bench gpu quality size external format clean clean-results
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -20,6 +20,7 @@ help:
 	@echo "make bench       timings, as ratios measured side by side"
 	@echo "make gpu         what needs a GPU, tried and recorded (10 minutes; GPU=--real for a capture too)"
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
+	@echo "make size        seconds to 25 dB by size of the pictures, memory by number of views (10 minutes)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
 
@@ -73,6 +74,9 @@ gpu:
 
 quality: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_quality.py $(BENCH)
+
+size: dev
+	$(THREADS) $(BIN)/python tests/bench/bench_size.py $(BENCH)
 
 # A program that is not ours behind `command:`; its environment is kept in build/external.
 external: dev

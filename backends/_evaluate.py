@@ -16,7 +16,7 @@ from ..common.files import finite_or_none, read_json, sealed, sha256_file, unsea
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
-from ..scenes.images import load_images
+from ..scenes.images import read_images
 from ..scenes.pictures import picture_name, save_png, to_uint8
 from ..scenes.types import Scene
 from . import _registry
@@ -56,7 +56,7 @@ def evaluate(
     code = code_of(train["backend"], backend, scene.format)  # as it is when it is loaded
     began = time.perf_counter()
     indices = np.arange(len(scene.test))
-    truth, cameras = load_images(scene.test, indices, train["width"])
+    truths, cameras = read_images(scene.test, indices, train["width"])
     weights = lpips_weights(settings.metrics.lpips_weights)
     renders = out / "renders"
     temporary = out / ".renders"
@@ -64,8 +64,10 @@ def evaluate(
     temporary.mkdir(parents=True)
     views: list[dict[str, Any]] = []
     try:
-        for number, (name, image) in enumerate(zip(scene.test.names, backend.render(model, cameras), strict=True)):
-            pixels = to_uint8(image, truth[number].shape, name)
+        drawn = zip(scene.test.names, truths, backend.render(model, cameras), strict=True)
+        for number, (name, picture, image) in enumerate(drawn):
+            truth = picture.pixels()
+            pixels = to_uint8(image, truth.shape, name)
             file = picture_name(number, name)
             save_png(pixels, temporary / file)
             rendered = pixels.astype(np.float32) / 255
@@ -73,9 +75,9 @@ def evaluate(
                 {
                     "name": name,
                     "file": f"renders/{file}",
-                    "psnr_db": finite_or_none(psnr_db(rendered, truth[number])),
-                    "ssim": finite_or_none(ssim(rendered, truth[number])),
-                    "lpips": None if weights is None else lpips(rendered, truth[number], weights),
+                    "psnr_db": finite_or_none(psnr_db(rendered, truth)),
+                    "ssim": finite_or_none(ssim(rendered, truth)),
+                    "lpips": None if weights is None else lpips(rendered, truth, weights),
                 }
             )
             progress(number + 1, len(scene.test), "")

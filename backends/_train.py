@@ -22,11 +22,12 @@ from ..common.rng import seed_of
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
-from ..scenes.images import load_images
+from ..scenes.images import read_images
 from ..scenes.types import Cameras, Scene
 from ..selectors._selection import check_selection, selection_sha256
 from . import _registry
 from ._memory import peak_rss_bytes
+from ._pictures import KEPT_BYTES, Pictures
 from ._psnr import psnr_db
 from ._types import SOURCES, WITHOUT, Budget, Job, Probe, Report, Trained, TrainingSet
 
@@ -63,16 +64,7 @@ def train(
     scene_hash = scene_sha256(scene)
     indices = check_selection(selection, scene, scene_hash)
     views = scene.train.subset(indices)
-    images, cameras = load_images(scene.train, indices, job.width)
-    data = TrainingSet(
-        scene=scene.name,
-        names=views.names,
-        cameras=cameras,
-        images=images,
-        points=scene.points,
-        chosen=indices,
-        training=scene.train.cameras if job.width is None else scene.train.cameras.scaled(job.width),
-    )
+    read, cameras = read_images(scene.train, indices, job.width)
     # Neither selector nor count is in it: what is drawn beside the views (which of the scene's points, say) is then
     # the same for every choice.
     cell_seed = seed_of("train", job.backend, scene.name, job.seed) % 2**31
@@ -91,9 +83,19 @@ def train(
         "configuration": _registry.configuration_of(backend)["train"],
     }
     work = _work_folder(out, asked, resumes=backend.CAPABILITIES.resumes)
-    report = Report(progress=progress, probe=_probe(scene, job.width) if job.curve and len(scene.test) else None)
     try:
-        trained = backend.train(data, work / "model", cell_seed, job.budget, options, report)
+        report = Report(progress=progress, probe=_probe(scene, job.width) if job.curve and len(scene.test) else None)
+        with Pictures(read, (int(cameras.height[0]), int(cameras.width[0]), 3), work, KEPT_BYTES) as images:
+            data = TrainingSet(
+                scene=scene.name,
+                names=views.names,
+                cameras=cameras,
+                images=images,
+                points=scene.points,
+                chosen=indices,
+                training=scene.train.cameras if job.width is None else scene.train.cameras.scaled(job.width),
+            )
+            trained = backend.train(data, work / "model", cell_seed, job.budget, options, report)
     except (UserError, MemoryError) as error:
         for log in (work / "model").glob("*.log"):
             log.replace(out / log.name)  # what an external program said outlives its failure
@@ -164,11 +166,12 @@ def _probe(scene: Scene, width: int | None) -> Probe:
     """Mean test PSNR over a few evenly spaced test views; only the curve sees it."""
     count = min(PROBE_VIEWS, len(scene.test))
     chosen = np.unique(np.round(np.linspace(0, len(scene.test) - 1, count)).astype(np.int64))
-    truth, cameras = load_images(scene.test, chosen, width)
+    read, cameras = read_images(scene.test, chosen, width)
+    truth = list(read)
 
     def probe(render: Callable[[Cameras], Any]) -> float:
-        values = [psnr_db(np.clip(image, 0, 1), view) for image, view in zip(render(cameras), truth, strict=True)]
-        return float(np.mean(values))
+        drawn = zip(render(cameras), truth, strict=True)
+        return float(np.mean([psnr_db(np.clip(image, 0, 1), picture.pixels()) for image, picture in drawn]))
 
     return probe
 

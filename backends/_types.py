@@ -21,7 +21,7 @@ Evaluation is shared (`_evaluate.py`): a backend never sees a test image and nev
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -50,6 +50,24 @@ class Capabilities:
     options: dict[str, Any] = field(default_factory=dict)  # its options with their defaults
 
 
+class Images(Protocol):
+    """K pictures of one size, (H, W, 3) float32 in [0, 1] each, one at a time: they need not fit into memory at once.
+
+    An array (K, H, W, 3) is one too; `np.asarray` makes one of any.
+    """
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...  # (K, H, W, 3)
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int, /) -> np.ndarray: ...
+
+    def __iter__(self) -> Iterator[np.ndarray]: ...
+
+    def __array__(self) -> np.ndarray: ...
+
+
 @dataclass(frozen=True)
 class TrainingSet:
     """The chosen views, and beside them only what is the same for every choice."""
@@ -57,7 +75,7 @@ class TrainingSet:
     scene: str
     names: tuple[str, ...]  # K frame names in the order chosen
     cameras: Cameras  # K cameras, scaled to the size of the images
-    images: np.ndarray  # (K, H, W, 3) float32 in [0, 1]
+    images: Images  # (K, H, W, 3) float32 in [0, 1]; until `train` returns
     points: Points | None  # of the scene file; `seen_by` indexes the training split
     chosen: np.ndarray  # (K,) int64 indices of the chosen views in the training split
     training: Cameras  # the poses of all N training views: what `_surroundings.py` goes by, whatever was chosen

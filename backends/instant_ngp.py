@@ -103,7 +103,8 @@ class InstantNgp:
         order = np.random.default_rng(seed).permutation(len(data.names))
         scene = out / "scene"
         extra = {"aabb_scale": options["aabb_scale"]}
-        _subset.write(scene, "transforms", data.cameras[order], data.images[order], extra=extra)
+        images = (data.images[int(index)] for index in order)
+        _subset.write(scene, "transforms", data.cameras[order], images, extra=extra)
         report.progress(0, budget.iterations, f"running instant-ngp, which writes {LOG}")
         arguments = {
             "scene": scene / "transforms.json",

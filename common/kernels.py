@@ -69,6 +69,7 @@ FAST: Any = {
 compiled = numba.njit(cache=True, **FAST)
 inlined = numba.njit(inline="always", **FAST)
 strict = numba.njit(cache=True)  # arithmetic as Python has it, in the order in which it is written
-# The same without Python's checks, and without the lock that keeps other threads waiting.
+# In the order in which it is written too, so the same bits on every machine, but a division by zero gives infinity, and
+# other threads are not kept waiting: loops without sums run as vectors.
 exact = numba.njit(cache=True, error_model="numpy", boundscheck=False, nogil=True)
 written = numba.njit(inline="always", error_model="numpy", boundscheck=False)  # inlined into such

@@ -1,6 +1,9 @@
-"""Loads the pictures of a split at the size that training and scoring use."""
+"""Reads the pictures of a split at the size that training and scoring use."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,12 +12,35 @@ from .image_files import open_image
 from .types import Cameras, Split
 
 
+class Picture(NamedTuple):
+    """A picture in the smallest numbers that hold it exactly: 3 bytes a pixel as it was, 6 as a mean of blocks."""
+
+    numbers: np.ndarray  # (H, W, 3) uint8, uint16 or float32
+    one: int  # the number that stands for 1
+
+    def pixels(self) -> np.ndarray:
+        """(H, W, 3) float32 RGB in [0, 1], new."""
+        return self.numbers / np.float32(self.one) if self.one > 1 else self.numbers.copy()
+
+
 def load_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[np.ndarray, Cameras]:
-    """(K, H, W, 3) float32 RGB in [0, 1] of the frames at `indices`, and their pinhole cameras at that size.
+    """(K, H, W, 3) float32 RGB in [0, 1] of the frames at `indices`, all at once, and their cameras.
+
+    See `read_images`.
+    """
+    read, cameras = read_images(split, indices, width)
+    images = np.empty((len(cameras), int(cameras.height[0]), int(cameras.width[0]), 3), np.float32)
+    for image, picture in zip(images, read, strict=True):
+        image[:] = picture.pixels()
+    return images, cameras
+
+
+def read_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[Iterator[Picture], Cameras]:
+    """The frames at `indices`, each read when its turn comes, and their pinhole cameras at that size.
 
     `width` in pixels resizes by area average; None keeps the size. Lens distortion is taken out, alpha is laid on
-    white. Raises UserError for a missing or broken file, a size that is not the camera's, mixed sizes, and a lens
-    that is not OpenCV's.
+    white. Raises UserError for mixed sizes and a lens that is not OpenCV's, and as it reads for a missing or broken
+    file and a size that is not the camera's.
     """
     if split.lens:
         raise UserError(f"cameras are {split.lens}, not pinholes; undistort the capture (colmap image_undistorter)")
@@ -24,19 +50,25 @@ def load_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[n
     sizes = set(zip(cameras.width.tolist(), cameras.height.tolist(), strict=True))
     if len(sizes) > 1:
         raise UserError(f"frames have different sizes, {sorted(sizes)}; resize the images of the capture to one")
-    images = []
-    for place, index in enumerate(indices):
-        size = (int(cameras.width[place]), int(cameras.height[place]))
-        pixels = _read(split.paths[index], (int(full.width[place]), int(full.height[place])), size)
-        if cameras.distortion is not None:
-            pixels = _undistorted(pixels, cameras[place])
-        images.append(pixels)
-    from dataclasses import replace
-
-    return np.stack(images), replace(cameras, distortion=None)
+    return _read_all([split.paths[index] for index in indices], full, cameras), replace(cameras, distortion=None)
 
 
-def _read(path: Path, expected: tuple[int, int], size: tuple[int, int]) -> np.ndarray:
+def _read_all(paths: list[Path], full: Cameras, cameras: Cameras) -> Iterator[Picture]:
+    lens, where = b"", np.zeros(0)
+    for path, before, camera in zip(paths, full, cameras, strict=True):
+        size = (int(camera.width[0]), int(camera.height[0]))
+        picture = _shrunk(_read(path, (int(before.width[0]), int(before.height[0]))), size)
+        if camera.distortion is not None:
+            # Most captures have one camera, and finding where its lens looks takes as long as the rest.
+            same = b"".join(value.tobytes() for name, value in vars(camera).items() if name != "c2w")
+            if same != lens:
+                lens, where = same, _distorted(camera)
+            picture = Picture(_sampled(picture.pixels(), where), 1)
+        yield picture
+
+
+def _read(path: Path, expected: tuple[int, int]) -> np.ndarray:
+    """(H, W, 3) uint8."""
     from PIL import Image
 
     with open_image(path) as image:
@@ -47,40 +79,61 @@ def _read(path: Path, expected: tuple[int, int], size: tuple[int, int]) -> np.nd
             image_rgb = Image.new("RGB", layered.size, "white")
             image_rgb.paste(layered, mask=layered.getchannel("A"))
         else:
-            image_rgb = image.convert("RGB")
-        return _area_average(np.asarray(image_rgb, dtype=np.float32) / 255, size)
+            image_rgb = image if image.mode == "RGB" else image.convert("RGB")  # which copies
+        return np.asarray(image_rgb)
 
 
-def _area_average(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """(H, W, 3) averaged over the area of each new pixel, not rounded to 8 bits on the way."""
+def _shrunk(rgb: np.ndarray, size: tuple[int, int]) -> Picture:
+    """A picture (H, W, 3) uint8 averaged over the area of each new pixel, not rounded to 8 bits on the way."""
     from PIL import Image
 
-    height, width = pixels.shape[:2]
+    height, width = rgb.shape[:2]
     if (width, height) == size:
-        return pixels
+        return Picture(rgb, 255)
     if width % size[0] == 0 and height % size[1] == 0:
-        blocks = pixels.reshape(size[1], height // size[1], size[0], width // size[0], 3)
-        return blocks.mean(axis=(1, 3))
+        return _sums(rgb, width // size[0], height // size[1])
+    pixels = rgb / np.float32(255)
     channels = [Image.fromarray(pixels[..., c]).resize(size, Image.Resampling.BOX) for c in range(3)]
-    return np.stack([np.asarray(channel) for channel in channels], axis=-1)
+    return Picture(np.stack([np.asarray(channel) for channel in channels], axis=-1), 1)
 
 
-def _undistorted(pixels: np.ndarray, camera: Cameras) -> np.ndarray:
-    """The picture that a pinhole with the same focal lengths and centre would see.
+def _sums(rgb: np.ndarray, across: int, down: int) -> Picture:
+    """Means of blocks of pixels, as their sums: whole numbers, in whatever order they are added."""
+    one = 255 * across * down
+    kind = np.uint16 if one < 1 << 16 else np.uint32
+    rows = rgb[::down].astype(kind)
+    for k in range(1, down):
+        rows += rgb[k::down]
+    sums = np.empty((rows.shape[0], rows.shape[1] // across, 3), kind)
+    for channel in range(3):  # one by one: numpy is slow where the innermost axis is of length 3
+        plane = rows[..., channel]
+        sums[..., channel] = plane[:, ::across]
+        for k in range(1, across):
+            sums[..., channel] += plane[:, k::across]
+    return Picture(sums, one) if kind is np.uint16 else Picture((sums / one).astype(np.float32), 1)
 
-    OpenCV's model: x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²), y' likewise; sampled bilinearly.
+
+def _distorted(camera: Cameras) -> np.ndarray:
+    """(2, H, W) float64 row and column, from the first pixel's centre, where the camera sees a pinhole's pixels.
+
+    The pinhole has the same focal lengths and centre. OpenCV's model:
+    x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²), y' likewise.
     """
-    from scipy.ndimage import map_coordinates
-
     assert camera.distortion is not None
     k1, k2, p1, p2, k3 = camera.distortion[0]
     fx, fy, cx, cy = camera.fx[0], camera.fy[0], camera.cx[0], camera.cy[0]
-    v, u = np.mgrid[: pixels.shape[0], : pixels.shape[1]] + 0.5
+    v, u = np.mgrid[: int(camera.height[0]), : int(camera.width[0])] + 0.5
     x, y = (u - cx) / fx, (v - cy) / fy
     r2 = x * x + y * y
     radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
     xd = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
     yd = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    where = np.stack([yd * fy + cy - 0.5, xd * fx + cx - 0.5])
+    return np.stack([yd * fy + cy - 0.5, xd * fx + cx - 0.5])
+
+
+def _sampled(pixels: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(H, W, 3) float32, bilinearly."""
+    from scipy.ndimage import map_coordinates
+
     channels = [map_coordinates(pixels[..., c], where, order=1, mode="nearest") for c in range(3)]
     return np.stack(channels, axis=-1)

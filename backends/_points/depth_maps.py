@@ -9,6 +9,7 @@ import numpy as np
 from ...scenes.types import Cameras
 from .._shrink import cameras_shrunk, images_shrunk
 from .._types import TrainingSet
+from .agreement import agreeing
 from .neighbours import neighbours
 from .plane_sweep import sweep
 
@@ -82,21 +83,17 @@ def _agreed(maps: DepthMaps, near: float, far: float, rng: np.random.Generator) 
     count, height, width = maps.depth.shape
     if count < 2:
         return np.zeros(maps.depth.shape, bool)
-    inner, w2c = _intrinsics(maps.cameras), maps.cameras.world_to_camera()
+    w2c = maps.cameras.world_to_camera()
+    projections = _intrinsics(maps.cameras) @ w2c[:, :3]
     witnesses, _ = neighbours(maps.cameras, np.arange(count), WITNESSES, near, far, rng)
-    agreeing = np.zeros((count, height * width), np.int64)
+    agreed = np.zeros((count, height * width), bool)
     for i in range(count):
         candidates = np.flatnonzero(maps.sure[i])
         positions, _ = maps.points(candidates + i * height * width)
-        for j in witnesses[i]:
-            seen = (positions @ w2c[j, :3, :3].T + w2c[j, :3, 3]) @ inner[j].T
-            z = np.where(seen[:, 2] > 1e-9, seen[:, 2], np.inf)
-            column, row = np.floor(seen[:, 0] / z), np.floor(seen[:, 1] / z)
-            inside = np.isfinite(z) & (column >= 0) & (row >= 0) & (column < width) & (row < height)
-            z = z[inside]
-            theirs = maps.depth[j, row[inside].astype(np.int64), column[inside].astype(np.int64)]
-            agreeing[i, candidates[inside]] += np.abs(theirs - z) < TOLERANCE * z
-    return (agreeing >= min(AGREEING, count - 1)).reshape(maps.depth.shape)
+        found = np.zeros(len(candidates), np.int64)
+        agreeing(positions, witnesses[i], projections, w2c, maps.depth, TOLERANCE, found)
+        agreed[i, candidates] = found >= min(AGREEING, count - 1)
+    return agreed.reshape(maps.depth.shape)
 
 
 def _guess(maps: DepthMaps) -> None:

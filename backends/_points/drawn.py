@@ -20,7 +20,11 @@ def along_rays(data: TrainingSet, count: int, extent: float, rng: np.random.Gene
     y = (row + 0.5 - cameras.cy[view]) / cameras.fy[view] * depth
     inside = np.stack([x, -y, -depth], axis=1)
     points = np.einsum("nij,nj->ni", cameras.rotations[view], inside) + cameras.positions[view]
-    return Start(points, data.images[view, row, column].astype(np.float64), "ray")
+    colours = np.zeros((count, 3))
+    for i in np.unique(view):
+        of = np.flatnonzero(view == i)
+        colours[of] = data.images[int(i)][row[of], column[of]]
+    return Start(points, colours, "ray")
 
 
 def random_box(data: TrainingSet, count: int, rng: np.random.Generator) -> Start:

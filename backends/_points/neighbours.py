@@ -30,11 +30,15 @@ def neighbours(
         y = (down * cameras.height[i] - cameras.cy[i]) / cameras.fy[i] * depth
         points = np.stack([x, -y, -depth], axis=1) @ cameras.rotations[i].T + cameras.positions[i]
         inside = visible(points, w2c, cameras)
-        mine, theirs = points - cameras.positions[i], points - cameras.positions[:, None]
+        # Angles of the points that are seen alone: they are few, and the rest weighs nothing.
+        other, point = np.nonzero(inside)
+        mine, theirs = points[point] - cameras.positions[i], points[point] - cameras.positions[other]
         lengths = np.linalg.norm(mine, axis=-1) * np.linalg.norm(theirs, axis=-1)
         angle = np.degrees(np.arccos(np.clip((mine * theirs).sum(-1) / np.maximum(lengths, 1e-12), -1, 1)))
         off = (angle - ANGLE) / np.where(angle < ANGLE, NARROWER, WIDER)
-        weight = (inside * np.exp(-0.5 * off**2)).mean(axis=1)
+        good = np.zeros(inside.shape)
+        good[other, point] = np.exp(-0.5 * off**2)
+        weight = good.mean(axis=1)
         weight[i] = -1
         best[row] = np.argsort(-weight, kind="stable")[: best.shape[1]]
         value[row] = weight[best[row]]

@@ -1,5 +1,6 @@
 """Fits Gaussians to the chosen views with gsplat's rasteriser and one of its densification strategies."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from .. import _snapshot
 from .._gaussian_ply import Gaussians
 from .._points import Start
 from .._surroundings import NEAR_PLANE, Surroundings
-from .._types import Budget, Report, TrainingSet
+from .._types import Budget, Images, Report, TrainingSet
 from .densification import PAPER_STEPS, Densification
 from .gaussians import (
     MEANS_DECAY,
@@ -95,7 +96,7 @@ def _run(task: Task, params: Parameters, extent: float, renderer: Renderer) -> S
         index = state.next_view(len(data.names))
         degree = min(task.options["sh_degree"], state.step * PAPER_STEPS // (SH_EVERY * steps))
         image, info = renderer.render(params, data.cameras[index], degree)
-        value = loss(image, images[index].to(renderer.device, non_blocking=True))
+        value = loss(image, images(index))
         densification.before_backward(state.step, info)
         (value + densification.regularisation()).backward()
         for optimizer in optims.values():
@@ -153,10 +154,13 @@ class _Clock:
         return time.perf_counter()
 
 
-def _images(images: np.ndarray, device: str) -> torch.Tensor:
-    """The views on the GPU where they take a small part of what is free there; else in main memory, sent one by one."""
-    tensor = torch.from_numpy(images)
-    if not device.startswith("cuda"):
-        return tensor
-    free, _ = torch.cuda.mem_get_info(device)
-    return tensor.to(device) if tensor.nbytes < RESIDENT_SHARE * free else tensor
+def _images(images: Images, device: str) -> Callable[[int], torch.Tensor]:
+    """Views on the device: all of them once where they take a small part of what is free there, else one by one."""
+    if device.startswith("cuda"):
+        free, _ = torch.cuda.mem_get_info(device)
+        if 4 * math.prod(images.shape) < RESIDENT_SHARE * free:
+            resident = torch.empty(images.shape, device=device)
+            for place, image in enumerate(images):
+                resident[place] = torch.from_numpy(image)
+            return resident.__getitem__
+    return lambda index: torch.from_numpy(images[index]).to(device)

@@ -53,7 +53,7 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
     weights = Weights(o.ssim, o.opacity_weight / gaussians.shape[1], o.scale_weight / gaussians.shape[1])
     # A step on copies loads the kernels, which is set-up and not training.
     moments, rates = Moments.zeros(gaussians), Rates.of_step(1, first_rates)
-    full.trainer.step(gaussians.copy(), moments, full.cameras[0], full.targets[0], rates, Weights(o.ssim, 1e-9, 1e-9))
+    full.trainer.step(gaussians.copy(), moments, full.cameras[0], full.target(0), rates, Weights(o.ssim, 1e-9, 1e-9))
     setup = time.perf_counter() - entered
     state = State.load(out) or State(gaussians, Moments.zeros(gaussians), rng)
     saved = began = time.perf_counter() - state.seconds
@@ -64,7 +64,7 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
         state.step += 1
         rates = Rates.of_step(state.step, first_rates * last**share)
         stage = coarse if coarse and share < o.coarse else full
-        camera, target = stage.cameras[view], stage.targets[view]
+        camera, target = stage.cameras[view], stage.target(view)
         loss = stage.trainer.step(state.gaussians, state.moments, camera, target, rates, weights)
         state.losses = [*state.losses[1 - min(views, ROUND) :], loss] if views > 1 else [loss]
         if state.step % o.relocate_every == 0 and share < o.relocate_until:
@@ -99,7 +99,7 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
 
 
 def _check(data: TrainingSet) -> None:
-    if not np.isfinite(data.images).all():
+    if not all(np.isfinite(image).all() for image in data.images):
         raise UserError("the training images have NaN or infinite pixels")
 
 

@@ -15,6 +15,7 @@ from ...common.kernels import exact, written
 from ...common.lanes import fma, load, magnitude, shifted, spread, store, where
 from .kernels import ONE, TWO, ZERO, F
 from .planes import RADIUS, Planes
+from .windows import measure
 
 C1, C2 = F(1e-4), F(9e-4)
 _window = np.exp(-(np.arange(-RADIUS, RADIUS + 1) ** 2) / (2 * 1.5**2))
@@ -32,21 +33,23 @@ class Target(NamedTuple):
 
     @classmethod
     def of(cls, image: np.ndarray, planes: Planes) -> "Target":
-        """Of an image (H, W, 3)."""
-        from scipy.ndimage import convolve1d
+        """Of an image (H, W, 3) float32."""
+        return cls.zeros(planes).filled(image, planes)
 
-        def blur(plane: np.ndarray) -> np.ndarray:
-            first = convolve1d(plane, WINDOW, axis=0, mode="constant")
-            return convolve1d(first, WINDOW, axis=1, mode="constant")
+    @classmethod
+    def zeros(cls, planes: Planes) -> "Target":
+        """Room for one."""
+        return cls(planes.zeros(3), planes.zeros(3), planes.zeros(3))
 
-        made = cls(planes.zeros(3), planes.zeros(3), planes.zeros(3))
-        for channel in range(3):
-            values = image[..., channel].astype(np.float64)
-            mean = blur(values)
-            planes.inside(made.image[channel])[:] = values
-            planes.inside(made.mean[channel])[:] = mean
-            planes.inside(made.variance[channel])[:] = blur(values * values) - mean * mean
-        return made
+    def filled(self, image: np.ndarray, planes: Planes) -> "Target":
+        """Itself, of an image (H, W, 3) float32 of the same size."""
+        measure(np.ascontiguousarray(image, np.float32), WINDOW[RADIUS:], planes.stride, *self)
+        return self
+
+    @property
+    def nbytes(self) -> int:
+        """Of memory."""
+        return sum(part.nbytes for part in self)
 
 
 class Local(NamedTuple):

@@ -22,17 +22,17 @@ def shell(data: TrainingSet, count: int, around: Surroundings) -> tuple[np.ndarr
     directions = _even(count)
     tree = KDTree(directions, leafsize=16)  # with other leaves, another of two equally near
     cameras = data.cameras
-    k, height, width, _ = data.images.shape
+    _, height, width, _ = data.images.shape
     rows = np.unique(np.linspace(0, height - 1, min(SAMPLES, height)).astype(np.int64))
     columns = np.unique(np.linspace(0, width - 1, min(SAMPLES, width)).astype(np.int64))
     row, column = (grid.ravel() for grid in np.meshgrid(rows, columns, indexing="ij"))
     total, seen = np.zeros((count, 3)), np.zeros(count)
-    for i in range(k):
+    for i, image in enumerate(data.images):
         x = (column + 0.5 - cameras.cx[i]) / cameras.fx[i]
         y = (row + 0.5 - cameras.cy[i]) / cameras.fy[i]
         rays = np.stack([x, -y, -np.ones(len(x))], axis=1) @ cameras.rotations[i].T
         nearest = tree.query(rays / np.linalg.norm(rays, axis=1, keepdims=True))[1]
-        np.add.at(total, nearest, data.images[i, row, column])
+        np.add.at(total, nearest, image[row, column])
         np.add.at(seen, nearest, 1)
     known = seen > 0
     colours = np.zeros((count, 3))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...scenes.types import Cameras
+from .._points.agreement import agreeing
 from .._points.plane_sweep import sweep
 from . import layout
 from .backward import Moments, Rates
@@ -25,3 +26,5 @@ def compile_kernels() -> None:
     trainer.step(gaussians, Moments.zeros(gaussians), camera_vectors(cameras)[0], target, rates, weights)
     picture = np.zeros((8, 8), np.float32)
     sweep(picture, picture[None], np.zeros((1, 3, 4)), np.ones(1), picture.copy(), picture.copy())
+    first = np.zeros(1, np.int64)
+    agreeing(np.zeros((1, 3)), first, np.zeros((1, 3, 4)), np.zeros((1, 4, 4)), picture[None], 0.1, first.copy())

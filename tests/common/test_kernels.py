@@ -154,7 +154,7 @@ print(signatures())
     warm, trained = (ast.literal_eval(line) for line in python(code).splitlines()[-2:])
     called = ["project", "sort_visible", "place_slots", "fill_slots", "place_lists", "fill_lists", "render"]
     called += ["compare", "descend", "render_backward", "project_backward", "regularise", "adam"]
-    called += ["sweep", "observe", "observers", "add"]
+    called += ["_sweep", "observe", "observers", "add"]
     assert {name: warm[name] for name in called} == dict.fromkeys(called, 1)
     assert trained == warm
     assert max(trained.values()) == 1

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
+from viewbench.scenes import images
 from viewbench.scenes.digest import scene_sha256
 from viewbench.scenes.images import load_images
 from viewbench.scenes.load import open_scene
@@ -66,10 +67,39 @@ def test_pictures_are_averaged_over_areas(small_room):
     assert full.shape == (2, 256, 256, 3)
     mean = full.reshape(2, 128, 2, 128, 2, 3).mean(axis=(2, 4))
     np.testing.assert_allclose(half, mean, atol=1e-6)
+    third, _ = load_images(scene.train, np.array([4, 1]), 100)  # no blocks of whole pixels
+    assert third.shape == (2, 100, 100, 3)
+    np.testing.assert_allclose(third.mean(axis=(1, 2)), full.mean(axis=(1, 2)), atol=1e-3)
     np.testing.assert_allclose(small.fx, cameras.fx / 2)
     np.testing.assert_array_equal(small.c2w, scene.train.cameras.c2w[[4, 1]])
     # a direction meets the same share of the picture at both sizes
     np.testing.assert_allclose(small.cx / small.width, cameras.cx / cameras.width)
+
+
+@pytest.mark.parametrize(("across", "down"), [(1, 1), (2, 2), (3, 5), (8, 8), (16, 16), (32, 16)])
+def test_means_of_blocks_are_exact(across, down):
+    """The nearest float32 of the true mean, whatever the size of the blocks."""
+    rgb = np.random.default_rng(across).integers(0, 256, (3 * down, 4 * across, 3), np.uint8)
+    rgb[:down, :across] = 255
+    picture = images._shrunk(rgb, (4, 3))
+    sums = rgb.reshape(3, down, 4, across, 3).sum(axis=(1, 3), dtype=np.int64)
+    pixels = picture.pixels()
+    np.testing.assert_array_equal(pixels, (sums / (255 * across * down)).astype(np.float32))
+    assert pixels[0, 0, 0] == 1
+    assert picture.numbers.nbytes <= (36 if across * down == 1 else 72) or across * down > 256
+
+
+def test_a_frame_is_read_when_its_turn_comes(small_room, tmp_path):
+    import shutil
+
+    shutil.copytree(small_room, tmp_path / "copy")
+    scene = open_scene(str(tmp_path / "copy"), SETTINGS)
+    read, cameras = images.read_images(scene.train, np.array([0, 1]), 64)
+    scene.train.paths[1].unlink()
+    assert next(read).pixels().shape == (64, 64, 3)
+    assert len(cameras) == 2
+    with pytest.raises(UserError, match="missing"):
+        next(read)
 
 
 def test_lens_distortion_is_taken_out(tmp_path):
@@ -89,12 +119,12 @@ def test_lens_distortion_is_taken_out(tmp_path):
         picture += np.exp(-((u - focal * x * bend - size / 2) ** 2 + (v - focal * y * bend - size / 2) ** 2) / 8)
     Image.fromarray(np.round(255 * np.clip(picture, 0, 1)).astype(np.uint8)).save(folder / "a.png")
     scene = open_scene(str(folder), SETTINGS)
-    images, cameras = load_images(scene.train, np.array([0]), None)
+    pictures, cameras = load_images(scene.train, np.array([0]), None)
     assert cameras.distortion is None
     for x, y in dots:
         row, column = focal * y + size / 2, focal * x + size / 2
         near = (np.abs(v - row) < 8) & (np.abs(u - column) < 8)
-        weight = images[0, ..., 0] * near
+        weight = pictures[0, ..., 0] * near
         assert abs((weight * u).sum() / weight.sum() - column) < 0.1
         assert abs((weight * v).sum() / weight.sum() - row) < 0.1
 

@@ -247,3 +247,26 @@ def test_the_benchmarks_torch_step_does_the_same_work():
         assert abs(loss - wanted) < 2e-4
     updated = np.stack([row.detach().numpy() for row in slow.rows])
     assert np.median(np.abs(updated - g)) < 2e-5
+
+
+@pytest.mark.parametrize(("height", "width"), [(1, 1), (3, 40), (33, 17)])
+def test_windows_of_a_photograph_are_those_of_scipy(height, width):
+    from scipy.ndimage import convolve1d
+
+    from viewbench.backends.splat.loss import WINDOW, Target
+    from viewbench.backends.splat.planes import Planes
+
+    def blurred(plane):
+        once = convolve1d(plane, WINDOW, axis=0, mode="constant")
+        return convolve1d(once, WINDOW, axis=1, mode="constant")
+
+    image = np.random.default_rng(0).uniform(0, 1, (height, width, 3)).astype(np.float32)
+    planes = Planes(width, height)
+    target = Target.of(image, planes)
+    for channel in range(3):
+        values = image[..., channel].astype(np.float64)
+        mean = blurred(values)
+        wanted = values, mean, blurred(values * values) - mean**2
+        for part, value in zip(target, wanted, strict=True):
+            np.testing.assert_allclose(planes.inside(part[channel]), value, atol=1e-7)
+            assert np.count_nonzero(part[channel]) <= height * width, "the padding is zero"
