@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..common import gpu, plugins
+from ..common import gpu, plugins, threads
 from ..common.errors import UserError
 from ..common.files import finite_or_none, read_json, sealed, sha256_file, unsealed, write_json
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
-from ..scenes.images import read_images
+from ..scenes.images import Picture, read_images
 from ..scenes.pictures import picture_name, save_png, to_uint8
 from ..scenes.types import Scene
 from . import _registry
@@ -54,6 +54,7 @@ def evaluate(
     if reason:
         raise UserError(f"backend '{train['backend']}' is not available: {reason}")
     code = code_of(train["backend"], backend, scene.format)  # as it is when it is loaded
+    threads.allow(settings.compute.threads)
     began = time.perf_counter()
     indices = np.arange(len(scene.test))
     truths, cameras = read_images(scene.test, indices, train["width"])
@@ -62,25 +63,28 @@ def evaluate(
     temporary = out / ".renders"
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir(parents=True)
+
+    def scored(drawn: tuple[int, tuple[str, Picture, np.ndarray]]) -> dict[str, Any]:
+        number, (name, picture, image) = drawn
+        truth = picture.pixels()
+        pixels = to_uint8(image, truth.shape, name)
+        file = picture_name(number, name)
+        save_png(pixels, temporary / file)
+        rendered = pixels.astype(np.float32) / 255
+        return {
+            "name": name,
+            "file": f"renders/{file}",
+            "psnr_db": finite_or_none(psnr_db(rendered, truth)),
+            "ssim": finite_or_none(ssim(rendered, truth)),
+            "lpips": None if weights is None else lpips(rendered, truth, weights),
+        }
+
     views: list[dict[str, Any]] = []
     try:
         drawn = zip(scene.test.names, truths, backend.render(model, cameras), strict=True)
-        for number, (name, picture, image) in enumerate(drawn):
-            truth = picture.pixels()
-            pixels = to_uint8(image, truth.shape, name)
-            file = picture_name(number, name)
-            save_png(pixels, temporary / file)
-            rendered = pixels.astype(np.float32) / 255
-            views.append(
-                {
-                    "name": name,
-                    "file": f"renders/{file}",
-                    "psnr_db": finite_or_none(psnr_db(rendered, truth)),
-                    "ssim": finite_or_none(ssim(rendered, truth)),
-                    "lpips": None if weights is None else lpips(rendered, truth, weights),
-                }
-            )
-            progress(number + 1, len(scene.test), "")
+        for view in threads.over(scored, enumerate(drawn)):
+            views.append(view)
+            progress(len(views), len(scene.test), "")
         shutil.rmtree(renders, ignore_errors=True)
         temporary.replace(renders)
     finally:

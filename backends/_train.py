@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..common import plugins
+from ..common import plugins, threads
 from ..common.errors import UserError, nearest
 from ..common.files import read_json, sealed, sha256_folder, write_json
 from ..common.provenance import commit, machine
@@ -52,6 +52,7 @@ def train(
     a backend that is unavailable or unknown, an option that it does not have, a selection that does not fit the
     scene, and whatever the backend refuses.
     """
+    threads.allow(settings.compute.threads)
     backend = _registry.load(job.backend, settings)
     lease = _registry.hold_gpu(backend, settings)
     reason = backend.available()

@@ -6,6 +6,7 @@ from typing import cast
 
 import numpy as np
 
+from ...common import threads
 from ...scenes.types import Cameras
 from .._shrink import cameras_shrunk, images_shrunk
 from .._types import TrainingSet
@@ -63,15 +64,19 @@ def depth_maps(data: TrainingSet, depths: tuple[float, float], rng: np.random.Ge
     sources, value = neighbours(cameras, views, SOURCES, near, far, rng)
     depth = np.zeros((len(views), *grey.shape[1:]), np.float32)
     score = np.full(depth.shape, -1, np.float32)
-    for row, i in enumerate(views):
-        use = sources[row][value[row] > LEAST_VALUE]
+
+    def look(row: int) -> None:
+        i, use = views[row], sources[row][value[row] > LEAST_VALUE]
         if not len(use):
-            continue
+            return
         relative = w2c[use] @ np.linalg.inv(w2c[i])
         homographies = np.empty((len(use), 3, 4))
         homographies[:, :, :3] = inner[use] @ relative[:, :3, :3] @ np.linalg.inv(inner[i])
         homographies[:, :, 3] = np.einsum("sab,sb->sa", inner[use], relative[:, :3, 3])
         sweep(grey[i], grey[use], homographies, planes, depth[row], score[row])
+
+    for _ in threads.over(look, range(len(views))):
+        pass
     believed = DepthMaps(cameras[views], images[views], depth, score > LEAST_SCORE, np.zeros(depth.shape, bool))
     believed.sure[:] &= _agreed(believed, near, far, rng)
     _guess(believed)

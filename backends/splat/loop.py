@@ -1,12 +1,14 @@
 """The training loop: one random view a step, learning rates that fall over the budget, relocation now and then."""
 
 import dataclasses
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from ...common import threads
 from ...common.errors import UserError
 from ...common.files import write_json
 from ...scenes.types import Cameras
@@ -23,6 +25,7 @@ from .relocate import relocate
 from .renderer import Renderer
 from .snapshot import State
 from .stages import Stage, halved
+from .team import Team
 from .trainer import Weights
 
 CURVE_POINTS = 10
@@ -47,8 +50,9 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
     if views < 2 and not (seeding.scene_points or seeding.random_points):
         raise UserError(f"{views} view and no points: nothing says how deep the scene is; choose at least 2 views")
     rendering = Rendering(o.near * around.nearest, o.background, o.sh_degree, o.low_pass, o.antialias)
-    full = Stage(data.images, data.cameras, gaussians.shape[1], rendering)
-    coarse = halved(data, gaussians.shape[1], rendering) if o.coarse else None
+    team = Team(threads.allowed())
+    full = Stage(data.images, data.cameras, gaussians.shape[1], rendering, team)
+    coarse = halved(data, gaussians.shape[1], rendering, team) if o.coarse else None
     first_rates, last = _rates(o, around.extent)
     weights = Weights(o.ssim, o.opacity_weight / gaussians.shape[1], o.scale_weight / gaussians.shape[1])
     # A step on copies loads the kernels, which is set-up and not training.
@@ -92,6 +96,7 @@ def train(data: TrainingSet, out: Path, seed: int, budget: Budget, options: dict
         iterations=state.step,
         seconds=state.seconds,
         n_primitives=model.shape[1],
+        threads=team.threads,
         seeding=seeding,
         curve=state.curve,
         notes={"relocated": state.relocated, "setup_seconds": setup},
@@ -125,13 +130,16 @@ def _finite(gaussians: np.ndarray) -> np.ndarray:
 def draw(gaussians: np.ndarray, cameras: Cameras, rendering: Rendering) -> Iterator[np.ndarray]:
     """Pictures (H, W, 3) in [0, 1] of the cameras, one after another; the degree is that of the Gaussians."""
     rendering = dataclasses.replace(rendering, degree=layout.degree_of(gaussians))
-    renderer: Renderer | None = None
-    for vector, camera in zip(camera_vectors(cameras), cameras, strict=True):
-        size = int(camera.width[0]), int(camera.height[0])
-        if renderer is None or (renderer.width, renderer.height) != size:
-            renderer = Renderer(gaussians.shape[1], *size, rendering)
-        picture = renderer.draw(gaussians, vector)
-        yield np.ascontiguousarray(np.clip(picture, 0, 1).transpose(1, 2, 0))
+    own = threading.local()  # a renderer for each thread
+
+    def picture(seen: tuple[np.ndarray, tuple[int, int]]) -> np.ndarray:
+        vector, size = seen
+        if getattr(own, "size", None) != size:
+            own.size, own.renderer = size, Renderer(gaussians.shape[1], *size, rendering)
+        return np.ascontiguousarray(np.clip(own.renderer.draw(gaussians, vector), 0, 1).transpose(1, 2, 0))
+
+    sizes = [(int(camera.width[0]), int(camera.height[0])) for camera in cameras]
+    return threads.over(picture, list(zip(camera_vectors(cameras), sizes, strict=True)))
 
 
 def _share(step: int, seconds: float, budget: Budget) -> float:

@@ -27,13 +27,13 @@ class Renderer:
 
     def resize(self, capacity: int) -> None:
         """Makes room for so many Gaussians."""
-        self.capacity = 16 * -(-max(capacity, 1) // 16)
-        self.splats = Splats.zeros(self.capacity)
-        self.order = Order.zeros(self.capacity)
+        self.capacity, columns = capacity, 16 * -(-capacity // 16)
+        self.splats = Splats.zeros(columns)
+        self.order = Order.zeros(columns)
         self._make_room(max(65536, 8 * capacity))
 
     def _make_room(self, pairs: int) -> None:
-        self.slots = Slots.zeros(self.capacity, pairs)
+        self.slots = Slots.zeros(len(self.splats.depth), pairs)
         self.tiles = Tiles.zeros(self.width, self.height, pairs, self.team.parts)
 
     def view(self, camera: np.ndarray) -> View:

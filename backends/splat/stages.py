@@ -12,6 +12,7 @@ from .._types import Images, TrainingSet
 from .loss import Target
 from .options import Rendering
 from .projection import camera_vectors
+from .team import Team
 from .trainer import Trainer
 
 SMALLEST = 80  # pixels: geometric mean of the sides that halved pictures must have
@@ -23,8 +24,8 @@ TARGETS = 512 << 20
 class Stage:
     """Training views of one size, `factor` times smaller than K pictures (K, H, W, 3), as the trainer takes them."""
 
-    def __init__(self, images: Images, cameras: Cameras, count: int, rendering: Rendering, factor: int = 1):
-        self.trainer = Trainer(count, images.shape[2] // factor, images.shape[1] // factor, rendering)
+    def __init__(self, images: Images, cameras: Cameras, count: int, rendering: Rendering, team: Team, factor: int = 1):
+        self.trainer = Trainer(count, images.shape[2] // factor, images.shape[1] // factor, rendering, team)
         self.cameras = camera_vectors(cameras)
         self._images, self._factor = images, factor
         planes = self.trainer.renderer.planes
@@ -40,9 +41,9 @@ class Stage:
         return target.filled(image_shrunk(self._images[view], self._factor), self.trainer.renderer.planes)
 
 
-def halved(data: TrainingSet, count: int, rendering: Rendering) -> Stage | None:
+def halved(data: TrainingSet, count: int, rendering: Rendering, team: Team) -> Stage | None:
     """The views at half their size; None where that leaves too little to learn from."""
     _, height, width, _ = data.images.shape
     if math.sqrt((height // 2) * (width // 2)) < SMALLEST:
         return None
-    return Stage(data.images, cameras_shrunk(data.cameras, 2), count, rendering, factor=2)
+    return Stage(data.images, cameras_shrunk(data.cameras, 2), count, rendering, team, factor=2)

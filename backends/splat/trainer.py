@@ -50,12 +50,12 @@ class Trainer:
     def differentiate(self, gaussians: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """(rows, N) gradient of what `image_gradient` was set to, for the picture that was drawn last."""
         r, n = self.renderer, gaussians.shape[1]
-        capacity, pairs = r.capacity, len(r.slots.tile)
-        if n > capacity or len(gaussians) != len(self.gradient):
+        columns, pairs = len(r.splats.depth), len(r.slots.tile)
+        if n > r.capacity or len(gaussians) != len(self.gradient):
             raise ValueError(f"the picture was not drawn of these {n} Gaussians; draw it first")
         # The renderer makes room as it needs it, and the kernels check no bounds.
-        if self.gradient.shape[1] != capacity:
-            self.gradient = np.zeros((len(self.gradient), capacity), np.float32)
+        if self.gradient.shape[1] != columns:
+            self.gradient = np.zeros((len(self.gradient), columns), np.float32)
         if len(self.pair_gradient) != pairs:
             self.pair_gradient = np.zeros((pairs, PAIR_COLUMNS), np.float32)
         drawn, slots, tiles, view = r.splats.drawn, r.slots, r.tiles, r.view(camera)

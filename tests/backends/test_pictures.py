@@ -15,6 +15,7 @@ from viewbench.backends import _evaluate, _train
 from viewbench.backends._pictures import Pictures
 from viewbench.backends.splat import stages
 from viewbench.backends.splat.options import Rendering
+from viewbench.backends.splat.team import Team
 from viewbench.common.errors import UserError
 from viewbench.scenes import images
 from viewbench.scenes.images import Picture
@@ -132,7 +133,7 @@ def test_targets_that_are_made_anew_are_the_same(small_room, monkeypatch):
     for limit in (0, 400_000, 1 << 30):
         monkeypatch.setattr(stages, "TARGETS", limit)
         for factor in (1, 2):
-            stage = stages.Stage(views, cameras, 10, Rendering(), factor)
+            stage = stages.Stage(views, cameras, 10, Rendering(), Team(), factor)
             found.append(b"".join(part.tobytes() for view in (2, 0, 1, 2) for part in stage.target(view)))
     assert found[0::2] == found[:1] * 3
     assert found[1::2] == found[1:2] * 3

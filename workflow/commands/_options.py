@@ -3,7 +3,7 @@
 import functools
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,16 @@ count_rule_option = click.option(
     help="How a ratio becomes a number of views; floor is the paper's authors'.",
 )
 out_option = click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder to write.")
+threads_option = click.option(
+    "--threads",
+    type=click.IntRange(min=1),
+    help="Threads that one model takes; the numbers are the same for any. Else `compute.threads`, which is 1.",
+)
+
+
+def with_threads(settings: "Settings", threads: int | None) -> "Settings":
+    """The settings, with so many threads for this command where any are named."""
+    return settings if threads is None else replace(settings, compute=replace(settings.compute, threads=threads))
 
 
 @dataclass(frozen=True)

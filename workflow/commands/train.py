@@ -19,6 +19,7 @@ from . import _options
 @click.option("--iterations", type=click.IntRange(min=1), help="Stop after so many steps.")
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Stop after so long, set-up not counted.")
 @click.option("--width", type=click.IntRange(min=16), help="Resize images to so many pixels; else as they are.")
+@_options.threads_option
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Option of the backend; repeatable.")
 @_options.scene_options
 def command(**given: Any) -> None:
@@ -34,7 +35,7 @@ def command(**given: Any) -> None:
     from ...common.errors import UserError
     from ...selectors._selection import count_of, first_views, load_selection
 
-    settings = settings_file.load()
+    settings = _options.with_threads(settings_file.load(), given["threads"])
     budget = Budget(given["iterations"], given["seconds"])
     if budget == Budget():
         budget = Budget(_registry.load(given["backend"], settings).CAPABILITIES.default_iterations)

@@ -14,6 +14,8 @@ from viewbench.backends.splat.backward import Moments
 from viewbench.backends.splat.options import Rendering
 from viewbench.backends.splat.relocate import relocate
 from viewbench.backends.splat.snapshot import State
+from viewbench.backends.splat.team import Team
+from viewbench.backends.splat.team import Team
 from viewbench.common.errors import UserError
 from viewbench.scenes.types import Cameras, Points
 
@@ -112,7 +114,7 @@ def test_pictures_of_half_the_size_come_first(data, tmp_path, monkeypatch):
 
 
 def test_small_pictures_are_not_halved(data):
-    assert stages.halved(data, 10, Rendering()) is None
+    assert stages.halved(data, 10, Rendering(), Team()) is None
 
 
 def test_a_picture_of_half_the_size_is_of_the_same_things(data):
