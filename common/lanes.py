@@ -102,10 +102,10 @@ def _call(builder, name, result, args):
     return builder.call(function, args)
 
 
-def _place(context, builder, sig, args, array, indices):
+def _place(context, builder, sig, args, array, indices, kind=types.float32):
     """Address of an element of an array."""
-    if sig.args[array].layout != "C" or sig.args[array].dtype != types.float32:
-        raise numba.core.errors.TypingError(f"lanes are of contiguous float32, not of {sig.args[array]}")
+    if sig.args[array].layout != "C" or sig.args[array].dtype != kind:
+        raise numba.core.errors.TypingError(f"lanes are of contiguous {kind}, not of {sig.args[array]}")
     made = context.make_array(sig.args[array])(context, builder, args[array])
     whole = [context.cast(builder, args[i], sig.args[i], types.intp) for i in indices]
     offset = whole[0]
@@ -164,6 +164,18 @@ def store(typingctx, array, i, value):
 
     def build(context, builder, sig, args):
         builder.store(args[2], _as_vector(builder, _place(context, builder, sig, args, 0, (1,))), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, i, LANES), build
+
+
+@intrinsic
+def store_whole(typingctx, array, i, value):
+    """Writes 16 whole numbers, each smaller than 2³¹, into a one-dimensional array of int32."""
+
+    def build(context, builder, sig, args):
+        address = builder.bitcast(_place(context, builder, sig, args, 0, (1,), types.int32), _INTS.as_pointer())
+        builder.store(builder.fptosi(args[2], _INTS), address, align=4)
         return context.get_dummy_value()
 
     return types.void(array, i, LANES), build

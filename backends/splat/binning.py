@@ -12,20 +12,21 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.kernels import exact, written
-from ...common.lanes import floor, fma, larger, numbers, smaller, spread, sqrt, store, where
-from .kernels import HALF, ZERO, F
+from ...common.lanes import floor, fma, larger, numbers, smaller, spread, sqrt, store_whole, where
+from .kernels import HALF, ONE, ZERO, F
 from .projection import CURVE, HALF_HEIGHT, SLOPE, SQUARE, TILE, WIDEST, X, Y
 
 QUARTER = TILE // 2  # pixels
-ROWS = 16  # of quarters that are looked at at once
+ROWS = 8  # of quarters that are looked at at once
 AT_ONCE = 31  # tiles of a row, whose quarters fit the bits of a word
-NOWHERE = F(1 << 24)
+NOWHERE = 1 << 24
+FAR = F(1 << 24)  # pixels
 
 
 class Order(NamedTuple):
     """Visible splats in order of depth, and what sorting them takes."""
 
-    indices: np.ndarray  # (N,) int32, the first of them used, nearest first
+    indices: np.ndarray  # (N,) int32 places among the splats, the first of them used, nearest first
     keys: np.ndarray  # (N,) uint32, depth in 22 bits
     scratch: np.ndarray  # (N,) int32, indices half sorted
     scratch_keys: np.ndarray  # (N,) uint32
@@ -39,10 +40,10 @@ class Order(NamedTuple):
 class Slots(NamedTuple):
     """Slots of the pairs (splat, tile) that touch, grouped by splat; between the groups some stay empty."""
 
-    first: np.ndarray  # (N,) int32, where a splat's slots begin
-    number: np.ndarray  # (N,) int32, how many there are, 0 for splats that are not drawn
+    first: np.ndarray  # (N,) int32, where a Gaussian's slots begin
+    number: np.ndarray  # (N,) int32, how many there are, 0 for those that are not drawn
     tile: np.ndarray  # (P,) int32, by slot
-    splat: np.ndarray  # (P,) int32, by slot
+    splat: np.ndarray  # (P,) int32 place among the splats, by slot
     quarters: np.ndarray  # (P,) uint8, by slot: bits of those touched, upper left, upper right, lower left, lower right
 
     @classmethod
@@ -71,8 +72,8 @@ class Tiles(NamedTuple):
 
 
 @exact
-def sort_visible(n, depth, order):
-    """Writes the indices of visible splats among the first n, nearest first, into the order; returns their number.
+def sort_visible(splats, depth, parts, order):
+    """Writes the places of the splats of so many ranges, nearest first, into the order; returns their number.
 
     `depth` (N,) is that of the splats as uint32, which has the same order: positive floats count like their bits.
     Sorts 22 bits of them, 11 at a time: neighbours closer than 4e-6 of their depth keep their storage order (for
@@ -81,11 +82,10 @@ def sort_visible(n, depth, order):
     indices, keys, scratch, scratch_keys = order
     visible = 0
     nearest, farthest = np.uint32(0xFFFFFFFF), np.uint32(0)
-    for i in range(n):
-        key = depth[i]
-        if key > 0:
-            indices[visible] = i
-            keys[visible] = key
+    for part in range(parts):
+        for place in range(splats.ranges[part, 0], splats.ranges[part, 0] + splats.ranges[part, 1]):
+            key = depth[place]
+            indices[visible], keys[visible] = place, key
             visible += 1
             nearest, farthest = min(nearest, key), max(farthest, key)
     if visible == 0:
@@ -115,14 +115,14 @@ def sort_visible(n, depth, order):
 
 
 @exact
-def place_slots(visible, order, most, slots):
+def place_slots(visible, order, splats, slots):
     """Gives each of the `visible` first splats of the order its slots; returns how many there must be."""
     total = 0
     slots.number[:] = 0
     for j in range(visible):
-        i = order.indices[j]
-        slots.first[i] = total
-        total += int(most[i])
+        place = order.indices[j]
+        slots.first[splats.gaussian[place]] = total
+        total += splats.most[place]
     return total
 
 
@@ -134,41 +134,45 @@ def _word(begin, end, start):
 
 
 @exact
-def fill_slots(order, drawn, slots, tiles, part, first, last):
+def fill_slots(order, splats, slots, tiles, part, first, last):
     """Fills the slots of splats `first` to `last` of the order, and counts their pairs tile by tile."""
-    width, height, counts = tiles.width, tiles.height, tiles.counts[part]
+    width, height, counts, drawn = tiles.width, tiles.height, tiles.counts[part], splats.drawn
     across, down = (width + TILE - 1) // TILE, (height + TILE - 1) // TILE
     counts[:] = 0
-    begins, ends = np.empty(ROWS, np.float32), np.empty(ROWS, np.float32)
-    last_row, inverse, inverse_tile = F(2 * down - 1), F(1 / QUARTER), F(1 / TILE)
+    edges = np.empty(2 * ROWS, np.int32)
+    inverse_tile = F(1 / TILE)
+    # Right edges of 8 rows of quarters, then their left ones: one vector of both, told apart by a sign.
+    right = numbers() < F(ROWS)
+    side = where(right, spread(ONE), spread(-ONE))
+    row_of = where(right, numbers(), numbers() - F(ROWS)) * F(QUARTER)
+    # Pixels whose centres are inside, and a thousandth of a pixel around it.
+    around = where(right, spread(F(-0.499)), spread(F(0.501)))
     for j in range(first, last):
         i = order.indices[j]
         x, y, half_height = drawn[i, X], drawn[i, Y], drawn[i, HALF_HEIGHT]
         slope, square, curve, widest = drawn[i, SLOPE], drawn[i, SQUARE], drawn[i, CURVE], drawn[i, WIDEST]
         top = max(0, math.floor((y - half_height - HALF) * inverse_tile))
         bottom = min(down - 1, math.floor((y + half_height - HALF) * inverse_tile))
-        slot = np.int64(slots.first[i])
+        gaussian = splats.gaussian[i]
+        slot = np.int64(slots.first[gaussian])
         begin = slot
         for group in range(top, bottom + 1, ROWS // 2):
-            # What the ellipse spans in 16 rows of quarters, in whole quarters.
-            row = numbers() + F(2 * group)
-            upper = row * F(QUARTER) + (HALF - y)
+            # What the ellipse spans in 8 rows of quarters, in whole pixels.
+            upper = row_of + (F(TILE * group) + HALF - y)
             low = larger(upper, spread(-half_height))
             high = smaller(upper + F(QUARTER - 1), spread(half_height))
-            at = smaller(larger(spread(widest), low), high)
-            right = fma(-slope, at, x) + sqrt(larger(fma(-curve, at * at, square), spread(ZERO)))
-            at = smaller(larger(spread(-widest), low), high)
-            left = fma(-slope, at, x) - sqrt(larger(fma(-curve, at * at, square), spread(ZERO)))
-            # Pixels whose centres are inside, and a thousandth of a pixel around it.
-            first_pixel = larger(-floor(F(0.501) - left), spread(ZERO))
-            last_pixel = smaller(floor(right - F(0.499)), spread(F(width - 1)))
+            at = smaller(larger(side * widest, low), high)
+            reach = sqrt(larger(fma(-curve, at * at, square), spread(ZERO)))
+            edge = floor(fma(side, fma(-slope, at, x), reach) + around)
             # The extreme may lie between two rows of pixel centres: then there is none inside.
-            touched = (low <= high) & (first_pixel <= last_pixel) & (row <= last_row)
-            store(begins, 0, where(touched, floor(first_pixel * inverse), spread(NOWHERE)))
-            store(ends, 0, where(touched, floor(last_pixel * inverse), spread(F(-1))))
+            edge = where(low <= high, larger(smaller(edge, spread(FAR)), spread(-FAR)), spread(-FAR))
+            store_whole(edges, 0, edge)
             for tile_row in range(group, min(group + ROWS // 2, bottom + 1)):
                 k = 2 * (tile_row - group)
-                begin_0, end_0, begin_1, end_1 = int(begins[k]), int(ends[k]), int(begins[k + 1]), int(ends[k + 1])
+                begin_0, begin_1 = max(-edges[ROWS + k], 0), max(-edges[ROWS + k + 1], 0)
+                end_0, end_1 = min(edges[k], width - 1), min(edges[k + 1], width - 1)
+                begin_0, end_0 = (begin_0 // QUARTER, end_0 // QUARTER) if begin_0 <= end_0 else (NOWHERE, -1)
+                begin_1, end_1 = (begin_1 // QUARTER, end_1 // QUARTER) if begin_1 <= end_1 else (NOWHERE, -1)
                 end = max(end_0, end_1) // 2 + 1
                 for start in range(min(begin_0, begin_1) // 2, end, AT_ONCE):
                     above, below = _word(begin_0, end_0, 2 * start), _word(begin_1, end_1, 2 * start)
@@ -182,7 +186,7 @@ def fill_slots(order, drawn, slots, tiles, part, first, last):
                         slots.tile[slot], slots.splat[slot], slots.quarters[slot] = tile, i, quarters
                         counts[tile] += 1
                         slot += 1
-        slots.number[i] = slot - begin
+        slots.number[gaussian] = slot - begin
 
 
 @exact
@@ -200,11 +204,11 @@ def place_lists(tiles):
 
 
 @exact
-def fill_lists(order, slots, tiles, part, first, last):
+def fill_lists(order, splats, slots, tiles, part, first, last):
     """Puts the slots of splats `first` to `last` of the order into the lists of their tiles."""
     lists, places = tiles.lists, tiles.counts[part]
     for j in range(first, last):
-        i = order.indices[j]
+        i = splats.gaussian[order.indices[j]]
         begin = np.int64(slots.first[i])
         for slot in range(begin, begin + slots.number[i]):
             tile = slots.tile[slot]

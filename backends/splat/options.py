@@ -27,10 +27,10 @@ class Options:
     coarse: float = 0.5  # share of the budget that goes to pictures of half the size, where they are large enough
     rate_mean: float = 6e-4
     rate_mean_end: float = 0.1  # share of rate_mean that is left at the end
-    rate_scale: float = 0.03
+    rate_scale: float = 0.05
     rate_quaternion: float = 2e-3
-    rate_opacity: float = 0.05
-    rate_colour: float = 0.012
+    rate_opacity: float = 0.08
+    rate_colour: float = 0.02
     rate_sh: float = 3e-3
     rate_end: float = 0.3  # share of the other rates that is left at the end
     ssim: float = 0.2

@@ -35,7 +35,6 @@ from ...common.lanes import (
     spread,
     sqrt,
     store,
-    where,
 )
 from ...scenes.types import OPENCV, Cameras
 from .harmonics import MOST, colour, fill_basis
@@ -72,20 +71,20 @@ class View(NamedTuple):
 
 
 class Splats(NamedTuple):
-    """Gaussians on the screen."""
+    """Gaussians on the screen: those that are seen of each range of them, side by side from where the range begins."""
 
-    drawn: np.ndarray  # (N, SPLAT_COLUMNS) float32, of those that are seen
-    depth: np.ndarray  # (N,) float32, 0 where nothing is seen
-    most: np.ndarray  # (N,) float32, a bound on the tiles that are touched
+    drawn: np.ndarray  # (N, SPLAT_COLUMNS) float32
+    depth: np.ndarray  # (N,) float32
+    most: np.ndarray  # (N,) int32, a bound on the tiles that are touched
+    gaussian: np.ndarray  # (N,) int32, which it is
+    ranges: np.ndarray  # (parts, 2) int64, where a range begins and how many of it are seen
 
     @classmethod
-    def zeros(cls, capacity: int) -> "Splats":
-        """Room for so many Gaussians, a multiple of 16."""
-        return cls(
-            np.zeros((capacity, SPLAT_COLUMNS), np.float32),
-            np.zeros(capacity, np.float32),
-            np.zeros(capacity, np.float32),
-        )
+    def zeros(cls, capacity: int, parts: int) -> "Splats":
+        """Room for so many Gaussians, in so many ranges."""
+        drawn, depth = np.zeros((capacity, SPLAT_COLUMNS), np.float32), np.zeros(capacity, np.float32)
+        most, gaussian = np.zeros(capacity, np.int32), np.zeros(capacity, np.int32)
+        return cls(drawn, depth, most, gaussian, np.zeros((parts, 2), np.int64))
 
 
 def camera_vectors(cameras: Cameras) -> np.ndarray:
@@ -190,20 +189,20 @@ def view_direction(g, cam, i, which):
 
 
 @exact
-def project(g, view, splats, first, last):
-    """Fills the splats of Gaussians `first` (a multiple of 16) to `last` of g (rows, N)."""
+def project(g, view, splats, part, first, last):
+    """Fills the splats of range `part`, Gaussians `first` (a multiple of 16) to `last` of g (rows, N)."""
     cam, degree, near, low_pass, antialias = view
-    drawn, depth, most = splats
+    drawn, place = splats.drawn, first
     width, height = cam[WIDTH], cam[HEIGHT]
     limit_x, limit_y = spread(HALF * MARGIN * width / cam[FX]), spread(HALF * MARGIN * height / cam[FY])
     across, down = floor(spread((width + F(TILE - 1)) / F(TILE))), floor(spread((height + F(TILE - 1)) / F(TILE)))
-    memory, basis = np.empty(16 * COLUMNS + 16, np.float32), np.empty(16 * MOST, np.float32)
+    memory, basis = np.empty(16 * COLUMNS + 48, np.float32), np.empty(16 * MOST, np.float32)
     own, count = aligned(memory), (degree + 1) * (degree + 1)
+    most, depth = own + 16 * COLUMNS, own + 16 * (COLUMNS + 1)
     for i in range(first, last, 16):
         inside = numbers() < F(last - i)
         tx, ty, tz = to_camera(g, cam, i, inside)
         seen = inside & (tz > near)
-        store(depth, i, spread(ZERO))
         if bits(seen) == 0:
             continue
         rz = ONE / tz
@@ -231,14 +230,14 @@ def project(g, view, splats, first, last):
         left = bits(seen)
         if left == 0:
             continue
-        store(depth, i, where(seen, tz, spread(ZERO)))
         columns = smaller(floor((px + rx) * F(1 / TILE)) + ONE, across) - larger(
             floor((px - rx - ONE) * F(1 / TILE)), spread(ZERO)
         )
         rows = smaller(floor((py + ry) * F(1 / TILE)) + ONE, down) - larger(
             floor((py - ry - ONE) * F(1 / TILE)), spread(ZERO)
         )
-        store(most, i, columns * rows)
+        store(memory, most, columns * rows)
+        store(memory, depth, tz)
         dx, dy, dz = view_direction(g, cam, i, inside)
         fill_basis(degree, dx, dy, dz, basis)
         store(memory, own + 16 * X, px)
@@ -260,4 +259,8 @@ def project(g, view, splats, first, last):
             lane = lowest(left)
             left &= left - 1
             for column in range(COLUMNS):
-                drawn[i + lane, column] = memory[own + 16 * column + lane]
+                drawn[place, column] = memory[own + 16 * column + lane]
+            splats.depth[place], splats.most[place] = memory[depth + lane], int(memory[most + lane])
+            splats.gaussian[place] = i + lane
+            place += 1
+    splats.ranges[part, 0], splats.ranges[part, 1] = first, place - first

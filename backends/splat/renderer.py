@@ -22,18 +22,18 @@ class Renderer:
         self.planes = Planes(width, height)
         self.padded = self.planes.zeros(3)
         self.image = self.planes.inside(self.padded)
-        self.pairs = 0  # of splats and tiles that touch, in the picture drawn last
+        self.visible = self.pairs = 0  # splats, and pairs of them and tiles that touch, in the picture drawn last
         self.resize(capacity)
 
     def resize(self, capacity: int) -> None:
         """Makes room for so many Gaussians."""
         self.capacity, columns = capacity, 16 * -(-capacity // 16)
-        self.splats = Splats.zeros(columns)
+        self.splats = Splats.zeros(columns, self.team.parts)
         self.order = Order.zeros(columns)
         self._make_room(max(65536, 8 * capacity))
 
     def _make_room(self, pairs: int) -> None:
-        self.slots = Slots.zeros(len(self.splats.depth), pairs)
+        self.slots = Slots.zeros(len(self.order.indices), pairs)
         self.tiles = Tiles.zeros(self.width, self.height, pairs, self.team.parts)
 
     def view(self, camera: np.ndarray) -> View:
@@ -50,18 +50,20 @@ class Renderer:
         if n > self.capacity:
             raise ValueError(f"{n} Gaussians, made for at most {self.capacity}; resize the renderer")
         view, splats, order, team = self.view(camera), self.splats, self.order, self.team
-        team.each(lambda first, last: project(gaussians, view, splats, first, last), team.blocks(n))
-        visible = sort_visible(n, splats.depth.view(np.uint32), order)
-        room = place_slots(visible, order, splats.most, self.slots)
+        ranges = [(part, *ends) for part, ends in enumerate(team.blocks(n))]
+        team.each(lambda *part: project(gaussians, view, splats, *part), ranges)
+        visible = sort_visible(splats, splats.depth.view(np.uint32), len(ranges), order)
+        self.visible = visible
+        room = place_slots(visible, order, splats, self.slots)
         if room > len(self.tiles.lists):
             self._make_room(room + room // 2)
-            place_slots(visible, order, splats.most, self.slots)
+            place_slots(visible, order, splats, self.slots)
         slots, tiles = self.slots, self.tiles
         parts = [(part, *ends) for part, ends in enumerate(team.blocks(visible, 1))]
         used = tiles._replace(counts=tiles.counts[: len(parts)])
-        team.each(lambda *part: fill_slots(order, splats.drawn, slots, used, *part), parts)
+        team.each(lambda *part: fill_slots(order, splats, slots, used, *part), parts)
         self.pairs = place_lists(used)
-        team.each(lambda *part: fill_lists(order, slots, used, *part), parts)
+        team.each(lambda *part: fill_lists(order, splats, slots, used, *part), parts)
         team.each(
             lambda first, last: render(splats.drawn, slots, tiles, self.background, self.image, first, last),
             team.shares(tiles.starts),

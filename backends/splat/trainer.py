@@ -50,7 +50,7 @@ class Trainer:
     def differentiate(self, gaussians: np.ndarray, camera: np.ndarray) -> np.ndarray:
         """(rows, N) gradient of what `image_gradient` was set to, for the picture that was drawn last."""
         r, n = self.renderer, gaussians.shape[1]
-        columns, pairs = len(r.splats.depth), len(r.slots.tile)
+        columns, pairs = len(r.slots.number), len(r.slots.tile)
         if n > r.capacity or len(gaussians) != len(self.gradient):
             raise ValueError(f"the picture was not drawn of these {n} Gaussians; draw it first")
         # The renderer makes room as it needs it, and the kernels check no bounds.

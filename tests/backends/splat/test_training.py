@@ -15,7 +15,6 @@ from viewbench.backends.splat.options import Rendering
 from viewbench.backends.splat.relocate import relocate
 from viewbench.backends.splat.snapshot import State
 from viewbench.backends.splat.team import Team
-from viewbench.backends.splat.team import Team
 from viewbench.common.errors import UserError
 from viewbench.scenes.types import Cameras, Points
 
