@@ -31,6 +31,7 @@ rule track_cell:
         f"{RESULTS}/tracked/{AXES}.json",
     log:
         f"{RESULTS}/logs/track/{AXES}.log",
+    priority: 60
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,
