@@ -49,6 +49,9 @@ def _prepare() -> None:
 _prepare()
 
 from numba import njit  # noqa: E402
+from numba.core.config import reload_config  # noqa: E402
+
+reload_config()  # where numba was there before, in a process that was forked
 
 # Sums may be reordered and divisions turned into multiplications: the same bits on one machine, not on every one.
 FAST: Any = {
