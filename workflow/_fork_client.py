@@ -3,9 +3,11 @@
 Imported by every call of `viewbench`, so it imports little itself.
 """
 
+import contextlib
 import os
 import signal
 import sys
+from pathlib import Path
 
 ADDRESS = "VIEWBENCH_FORK_SERVER"  # path of the server's socket, for the jobs of a study
 LENGTH = 4  # bytes before a request, which say how long it is
@@ -18,7 +20,7 @@ def run(arguments: list[str]) -> int | None:
     import json
     import socket
 
-    request = {"arguments": arguments, "folder": os.getcwd(), "environment": dict(os.environ)}
+    request = {"arguments": arguments, "folder": str(Path.cwd()), "environment": dict(os.environ)}
     content = json.dumps(request).encode()  # names that are not UTF-8 are escaped
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         try:
@@ -41,7 +43,5 @@ def run(arguments: list[str]) -> int | None:
 
 
 def _pass_on(pid: int, number: int) -> None:
-    try:
+    with contextlib.suppress(ProcessLookupError):  # it has just ended
         os.killpg(pid, number)
-    except ProcessLookupError:  # it has just ended
-        pass

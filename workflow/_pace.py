@@ -1,7 +1,7 @@
 """What a run has done and what is left of it, by rule: which jobs run now, in words, and how long the rest takes."""
 
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -42,7 +42,7 @@ class Pace:
     finished: Counter = field(default_factory=Counter)
     failed: Counter = field(default_factory=Counter)
     running: dict[int, Running] = field(default_factory=dict)
-    took: Counter = field(default_factory=Counter)  # seconds of the finished jobs, by rule
+    took: dict[str, float] = field(default_factory=lambda: defaultdict(float))  # seconds of finished jobs, by rule
     busy: float = 0.0  # seconds of jobs since the first training began, whatever has become of them
     looked: float | None = None  # when `busy` was added up last
     training_since: float | None = None
