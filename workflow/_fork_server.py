@@ -124,6 +124,7 @@ def run(request: dict[str, Any], fds: list[int]) -> NoReturn:
         os.setpgid(0, 0)  # what is passed on reaches the programs that it starts too
         ctypes.CDLL(None).prctl(END_WITH_PARENT, signal.SIGTERM)
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         for number, fd in enumerate(fds):
             os.dup2(fd, number)
         os.closerange(3, max(fds, default=3) + 100)
@@ -173,7 +174,8 @@ def _kill(pid: int) -> None:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C: the run ends the jobs, and so the server
+    for ignored in (signal.SIGINT, signal.SIGTERM):  # of the whole group: the jobs end first, and the run says how
+        signal.signal(ignored, signal.SIG_IGN)
     server = Server(sys.argv[1])
     prepare()
     server.serve()

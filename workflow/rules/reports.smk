@@ -59,6 +59,7 @@ rule track:
         f"{RESULTS}/tracked.json",
     log:
         f"{RESULTS}/logs/track.log",
+    priority: 10  # the longest of what is done at the end
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,
