@@ -48,10 +48,9 @@ def _prepare() -> None:
 
 _prepare()
 
-from numba import njit  # noqa: E402
-from numba.core.config import reload_config  # noqa: E402
+from numba import config, njit  # noqa: E402
 
-reload_config()  # where numba was there before, in a process that was forked
+config.reload_config()  # in a process that was forked (workflow/_fork_server.py) numba was there before its settings
 
 # Sums may be reordered and divisions turned into multiplications: the same bits on one machine, not on every one.
 FAST: Any = {

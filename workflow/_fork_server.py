@@ -134,7 +134,7 @@ def run(request: dict[str, Any], fds: list[int]) -> NoReturn:
         os.environ.pop(ADDRESS, None)
         sys.argv = ["viewbench", *request["arguments"]]
         importlib.invalidate_caches()
-        from viewbench.workflow.commands import _main
+        from .commands import _main
 
         status = _main.run(request["arguments"])
     except SystemExit as error:
