@@ -5,9 +5,14 @@ import sys
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs a command; a user's mistake ends in one line on stderr and exit status 2."""
-    from .workflow.commands import _main
+    from .workflow import _fork_client
 
-    sys.exit(_main.run(arguments))
+    status = _fork_client.run(sys.argv[1:]) if arguments is None else None
+    if status is None:
+        from .workflow.commands import _main
+
+        status = _main.run(arguments)
+    sys.exit(status)
 
 
 if __name__ == "__main__":

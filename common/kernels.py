@@ -54,10 +54,14 @@ def _prepare() -> None:
 
 _prepare()
 
+import numba.core.config  # noqa: E402
 import numba.core.errors  # noqa: E402
 import numba.core.types  # noqa: E402
 import numba.core.typing.templates  # noqa: E402
 import numba.extending  # noqa: E402
+
+# In a process that was forked (workflow/_fork_server.py) numba was there before its settings.
+numba.core.config.reload_config()
 
 # Sums may be reordered and divisions turned into multiplications: the same bits on one machine, not on every one.
 FAST: Any = {

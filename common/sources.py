@@ -5,15 +5,13 @@ top or inside a function). Plug-ins are loaded by name, so a step names those it
 `# no source: why` is left out: what it brings does not touch the step's result.
 """
 
-import ast
 import functools
 import hashlib
 from pathlib import Path
 
+from . import statements
 from .files import sha256_file
 from .settings import PACKAGE
-
-NO_SOURCE = "# no source"
 
 
 def sources(*modules: str) -> dict[str, str]:
@@ -24,6 +22,7 @@ def sources(*modules: str) -> dict[str, str]:
     found: set[str] = set()
     for module in modules:
         found |= _closure(module)
+    statements.keep()
     paths = sorted(path for module in found if (path := _file(module)))
     return {path.relative_to(PACKAGE).as_posix(): _hash(path) for path in paths}
 
@@ -60,18 +59,13 @@ def imports(module: str) -> frozenset[str]:
         return frozenset()
     folder = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
     found: set[str] = set()
-    text = path.read_text(encoding="utf-8")
-    lines = text.splitlines()
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.stmt) and NO_SOURCE in lines[node.lineno - 1]:
-            continue
-        if isinstance(node, ast.ImportFrom) and node.level:
-            base = [*folder[: len(folder) - node.level + 1], *(node.module or "").split(".")]
+    for level, imported, names in statements.of_file(path):
+        if level:
+            base = [*folder[: len(folder) - level + 1], *imported.split(".")]
             name = ".".join(part for part in base if part)
-            dotted = [name, *(f"{name}.{alias.name}".lstrip(".") for alias in node.names)]
-        elif isinstance(node, ast.Import):
-            dotted = [alias.name for alias in node.names if alias.name.startswith("viewbench.")]
-            dotted = [name.removeprefix("viewbench.") for name in dotted]
+            dotted = [name, *(f"{name}.{alias}".lstrip(".") for alias in names)]
+        elif not imported:
+            dotted = [alias.removeprefix("viewbench.") for alias in names if alias.startswith("viewbench.")]
         else:
             continue
         found |= {name for name in dotted if name and _file(name)}

@@ -1,56 +1,83 @@
-"""One line for the whole study: cells done of all, and the time left; and what failed, in words.
+"""One line for the whole study: cells done of all, the time left and what is being done; and what failed, in words.
 
 Snakemake tells its loggers about every job. The default profile silences what it would print of them, and a handler
-of ours counts the jobs that finish cells instead.
+of ours counts the jobs instead (`_pace.py`). The line is drawn from the moment that the workflow is read, and again
+every second, so that it moves also where no job ends; nothing that goes wrong with it reaches the run.
 """
 
+import contextlib
 import logging
+import shutil
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
 
-STEPS = {"select": 0.02, "train": 0.88, "evaluate": 0.10}  # rough share of a cell's time, so that the bar moves evenly
+from ._pace import Pace
+
+TICK_S = 1.0  # between two drawings on a terminal
+LINE_S = 20.0  # between two lines elsewhere
+BAR = 20  # characters
 
 
 class Progress(logging.Handler):
     """Counts cells from Snakemake's log records; draws a bar on a terminal, a line now and then otherwise."""
 
-    def __init__(self, cells: int, stream: Any = None, clock: Any = time.monotonic):
+    def __init__(self, study: str, stream: Any = None, clock: Any = time.monotonic):
         super().__init__(logging.INFO)
-        self.cells, self.stream, self.clock = cells, stream or sys.stderr, clock
-        self.jobs: dict[int, tuple[str, list[str]]] = {}
-        self.planned = dict.fromkeys(STEPS, 0)
-        self.finished = dict.fromkeys(STEPS, 0)
+        self.stream, self.clock = stream or sys.stderr, clock
+        self.cells: int | None = None  # known when the study is read
+        self.phase = f"reading the study {study}"  # what is done where no job runs
+        self.pace = Pace(clock)
         self.failures: set[str] = set()  # outputs of jobs; some releases report one failure twice
-        self.began: float | None = None
+        self.began = clock()
         self.last_line = -1e9
-        self.width = 0
+        self.width = 0  # of what stands on the terminal's line
+        self.over = threading.Event()
+
+    def start(self) -> None:
+        """Draws the first line, and one every second from now on, in a thread that ends with the run."""
+        self.tick()
+        threading.Thread(target=self._keep_ticking, name="progress", daemon=True).start()
+
+    def _keep_ticking(self) -> None:
+        while not self.over.wait(TICK_S) and threading.main_thread().is_alive():
+            self.tick()
+
+    def tick(self) -> None:
+        """Draws the line as it is now."""
+        with contextlib.suppress(Exception), self._alone():
+            if not self.over.is_set():
+                self._show()
+
+    def says(self, phase: str, cells: int | None = None) -> None:
+        """What is being done before the jobs, and the number of cells when that is known."""
+        self.phase, self.cells = phase, cells if cells is not None else self.cells
+        self.tick()
 
     def emit(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(Exception):  # a line that cannot be drawn, or a record of another form: no matter
+            self._take(record)
+
+    def _take(self, record: logging.LogRecord) -> None:
         event = getattr(getattr(record, "event", None), "name", None)
         if event == "RUN_INFO":
-            self._plan(getattr(record, "stats", None) or {})
+            self.pace.plan(getattr(record, "stats", None) or {})
+            self.phase = "starting"
+            self._show(at_once=True)
         elif event == "JOB_INFO":
             job = vars(record)
-            self.jobs[job["jobid"]] = (job["rule_name"], list(job["log"] or []))
+            self.pace.begin(job["jobid"], job["rule_name"], dict(job.get("wildcards") or {}))
         elif event == "JOB_FINISHED":
-            rule, _ = self.jobs.get(getattr(record, "job_id", -1), ("", []))
-            if rule in self.finished:
-                self.finished[rule] += 1
+            rule = self.pace.end(getattr(record, "job_id", -1))
             self._show(final=rule == "page")
         elif event == "JOB_ERROR":
             self._fail(record)
 
-    def _plan(self, stats: dict[str, Any]) -> None:
-        # Stats are {"total": n, rule: n, ...} or {"stats": ...}; a rule that is not planned is missing.
-        for step in STEPS:
-            self.planned[step] = int(stats.get(step, 0) or 0)
-        self.began = self.clock()
-        self._show()
-
     def _fail(self, record: logging.LogRecord) -> None:
+        self.pace.end(getattr(record, "jobid", -1), failed=True)
         rule = getattr(record, "rule_name", "?")
         words = last_line(list(getattr(record, "log", []) or []))
         output = ", ".join(getattr(record, "output", []) or [])
@@ -63,60 +90,85 @@ class Progress(logging.Handler):
     @property
     def done(self) -> int:
         """Cells that have their files: those of earlier runs and those of this one."""
-        return self.cells - self.planned["evaluate"] + self.finished["evaluate"]
-
-    @property
-    def seconds_left(self) -> float | None:
-        """Estimate from the share of this run's work that is done; None before anything is."""
-        whole = sum(share * self.planned[step] for step, share in STEPS.items())
-        part = sum(share * self.finished[step] for step, share in STEPS.items())
-        if self.began is None or not part or self.finished["train"] == 0:
-            return None
-        return (self.clock() - self.began) * (whole - part) / part
+        return (self.cells or 0) - self.pace.planned["evaluate"] + self.pace.finished["evaluate"]
 
     def text(self) -> str:
-        """The line: cells, failures, elapsed time and time left."""
-        left = self.seconds_left
+        """The line: cells, failures, elapsed time, time left, and what runs."""
+        so_far = f"{_clock(self.clock() - self.began)} so far"
+        if self.cells is None or not self.pace.planned:
+            return f"{self.phase}, {so_far}"
         parts = [f"{self.done} of {self.cells} cells"]
         if self.failures:
             parts.append(f"{len(self.failures)} failed")
-        if self.began is not None:
-            parts.append(f"{_clock(self.clock() - self.began)} so far")
-        if self.done < self.cells:
-            parts.append(f"about {_clock(left)} left" if left is not None else "starting")
-        else:
-            parts.append("reports")
-        return ", ".join(parts)
+        parts.append(so_far)
+        left = self.pace.seconds_left if self.done < self.cells else None
+        if left is not None:
+            parts.append(f"about {_clock(left)} left")
+        return f"{', '.join(parts)}; {self.pace.doing() or self.phase}"
 
-    def _show(self, final: bool = False) -> None:
-        terminal = bool(getattr(self.stream, "isatty", lambda: False)())
+    def _show(self, at_once: bool = False, final: bool = False) -> None:
         now = self.clock()
-        if terminal:
-            share = self.done / self.cells if self.cells else 1.0
-            line = f"[{'#' * round(30 * share):<30}] {self.text()}"
+        if final:
+            self.phase = "the report is there"
+            self.over.set()
+        if bool(getattr(self.stream, "isatty", lambda: False)()):
+            share = self.done / self.cells if self.cells else 0.0
+            line = f"[{'#' * round(BAR * share):<{BAR}}] {self.text()}"
+            line = line[: max(BAR, shutil.get_terminal_size().columns - 1)]  # one that wraps cannot be drawn over
             print("\r" + line.ljust(self.width), end="\n" if final else "", file=self.stream, flush=True)
-            self.width = len(line)
-        elif final or now - self.last_line > 20:
+            self.width = 0 if final else len(line)
+        elif final or at_once or now - self.last_line >= LINE_S:
             self.last_line = now
             print(self.text(), file=self.stream, flush=True)
 
     def _clear(self) -> None:
         if self.width:
-            print("\r" + " " * self.width + "\r", end="", file=self.stream)
+            print("\r" + " " * self.width + "\r", end="", file=self.stream, flush=True)
+            self.width = 0
+
+    def stop(self) -> None:
+        """No line after this; the terminal's is removed."""
+        with contextlib.suppress(Exception), self._alone():
+            self.over.set()
+            self._clear()
+
+    @contextlib.contextmanager
+    def _alone(self) -> Any:
+        """While the body runs, no other thread draws: Python's logging holds the same lock around `emit`."""
+        self.acquire()
+        try:
+            yield
+        finally:
+            self.release()
+
+    def passes(self, record: logging.LogRecord) -> bool:
+        """Whether Snakemake may print this record, for which the line makes room."""
+        worth = _worth_reading(record)
+        if worth and "Nothing to be done" in str(record.msg):
+            self.stop()
+        elif worth:
+            with contextlib.suppress(Exception), self._alone():
+                self._clear()
+        return worth
 
 
-def attach(workflow: Any, cells: int) -> None:
-    """Adds the progress line to a real run of the main process, and silences the chatter around it."""
-    if workflow.output_settings.dryrun or not workflow.is_main_process:
-        return
+def attach(workflow: Any, study: str) -> Progress:
+    """The run's progress line; in a real run of the main process it is drawn, and the chatter around it silenced."""
     from snakemake.logging import logger
 
     for handler in logger.handlers:
         if isinstance(handler, Progress):
-            return
+            return handler
+    progress = Progress(study)
+    if workflow.output_settings.dryrun or not workflow.is_main_process:
+        progress.over.set()
+        return progress
+    for handler in logger.handlers:
         if handler.name == "DefaultStreamHandler":
-            handler.addFilter(_worth_reading)
-    logger.addHandler(Progress(cells))
+            handler.addFilter(progress.passes)
+    logger.addHandler(progress)
+    progress.start()
+    return progress
 
 
 def _worth_reading(record: logging.LogRecord) -> bool:

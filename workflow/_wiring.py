@@ -56,7 +56,8 @@ class Wiring:
 
     def alternatives(self, column: str) -> str:
         """Regular expression of the values that a wildcard can take."""
-        values = self.study.reports if column == "report" else sorted({cell[column] for cell in self.cells})
+        named = {"report": self.study.reports, "trainer": tuple(self.trainers)}
+        values = named[column] if column in named else sorted({cell[column] for cell in self.cells})
         return "|".join(re.escape(value) for value in values)
 
     def command(self, name: str) -> str:
@@ -172,6 +173,15 @@ class Wiring:
         with explained():
             return _registry.load(name, self.settings)
 
+    @cached_property
+    def trainers(self) -> dict[str, str]:
+        """The backends that train, each once however many names the study has for it, by what files call them."""
+        return {_file_name(entry.backend): entry.backend for entry in self.study.backends}
+
+    def warm(self, wildcards: Any) -> str:
+        """The file that says that the cell's backend is compiled."""
+        return f"{self.results}/warm/{_file_name(self.study.backend(wildcards.backend).backend)}"
+
     @functools.cache  # noqa: B019
     def _facts(self, name: str) -> dict[str, Any]:
         """Configuration of a backend and its version, None where it cannot be found out: the jobs will say why."""
@@ -180,8 +190,14 @@ class Wiring:
 
     def training(self, wildcards: Any) -> str:
         """What a training depends on besides scene, selection and options."""
-        name = self.study.backend(wildcards.backend).backend
-        step = f"train-{name.replace(':', '-')}"
+        return self._training(self.study.backend(wildcards.backend).backend)
+
+    def training_compiled(self, wildcards: Any) -> str:
+        """What the trainings depend on that wait for `trainer` to be compiled."""
+        return self._training(self.trainers[wildcards.trainer])
+
+    def _training(self, name: str) -> str:
+        step = f"train-{_file_name(name)}"
         if not self.lists.writes:
             return self.lists.path(step)
         facts = self._facts(name)
@@ -192,7 +208,7 @@ class Wiring:
     def scoring(self, wildcards: Any) -> str:
         """What a score depends on besides scene and model."""
         name = self.study.backend(wildcards.backend).backend
-        step = f"evaluate-{name.replace(':', '-')}"
+        step = f"evaluate-{_file_name(name)}"
         if not self.lists.writes:
             return self.lists.path(step)
         modules = ("workflow.commands.evaluate", *_evaluate.modules_of(name, self._backend(name)))
@@ -226,7 +242,13 @@ class Wiring:
 
     def gpu(self, wildcards: Any) -> int:
         """GPUs that a job needs, one at most."""
-        name = self.study.backend(wildcards.backend).backend
+        return self._gpu(self.study.backend(wildcards.backend).backend)
+
+    def warm_gpu(self, wildcards: Any) -> int:
+        """GPUs that compiling the trainer needs."""
+        return self._gpu(self.trainers[wildcards.trainer])
+
+    def _gpu(self, name: str) -> int:
         return int(self._backend(name).CAPABILITIES.device == "cuda")
 
     # Reports
@@ -265,6 +287,10 @@ class _Cell:
 
     def __init__(self, cell: dict[str, str]):
         self.scene, self.selector, self.ratio, self.seed = (cell[key] for key in ("scene", "selector", "ratio", "seed"))
+
+
+def _file_name(backend: str) -> str:
+    return backend.replace(":", "-")
 
 
 def _contents(folder: Path) -> dict[str, str]:

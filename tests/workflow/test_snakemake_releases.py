@@ -75,7 +75,8 @@ def test_progress_failures_and_silence(release, tmp_path):
     done = clone.snakemake(**variables)
     said = done.stdout + done.stderr
     assert done.returncode == 1, said
-    assert "0 of 4 cells, 0:00 min so far, starting" in said
+    assert re.search(r"^reading the study mini, 0:\d\d min so far$", said, re.MULTILINE), said
+    assert re.search(r"^0 of 4 cells, 0:\d\d min so far; \w", said, re.MULTILINE), said
     failures = [line for line in said.splitlines() if line.startswith("failed: ")]
     assert len(failures) == 2, said
     assert all("train of results/mini/cells/command-broken/" in line and "no luck" in line for line in failures)

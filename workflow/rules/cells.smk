@@ -1,4 +1,8 @@
 # The steps of a cell: a choice, which several cells may share, a model and its score.
+#
+# Priorities say what goes first where several jobs could: what others wait for (kernels), then what is nearest to a
+# result. So a cell whose choice is made is trained before further choices are made, and scored when it is trained;
+# results come in from the first minute on. What selectors with features wait for holds up no other selector's cells.
 
 CELL = f"{RESULTS}/cells/{AXES}"
 
@@ -13,6 +17,7 @@ rule select:
         f"{RESULTS}/selections/{{scene}}/{{selector}}/{{part}}/{{seed}}.json",
     log:
         f"{RESULTS}/logs/select/{{scene}}/{{selector}}/{{part}}/{{seed}}.log",
+    priority: 20
     params:
         selector=lambda wildcards: STUDY.selector(wildcards.selector).selector,
         options=WIRING.selector_options,
@@ -27,7 +32,7 @@ rule train:
     input:
         scene=WIRING.scene,
         selection=WIRING.selection,
-        warm=f"{RESULTS}/warm/{{backend}}",
+        warm=WIRING.warm,
         depends=WIRING.training,
     output:
         train=f"{CELL}/train.json",
@@ -36,6 +41,7 @@ rule train:
         f"{RESULTS}/logs/train/{AXES}.log",
     benchmark:
         f"{RESULTS}/benchmarks/train/{AXES}.tsv"
+    priority: 40
     threads: SETTINGS.compute.threads
     resources:
         gpu=WIRING.gpu,
@@ -62,8 +68,7 @@ rule evaluate:
         f"{RESULTS}/logs/evaluate/{AXES}.log",
     benchmark:
         f"{RESULTS}/benchmarks/evaluate/{AXES}.tsv"
-    # A cell that is trained is scored before the next one starts, so that results come in as the study runs.
-    priority: 10
+    priority: 50
     threads: SETTINGS.compute.threads
     resources:
         gpu=WIRING.gpu,

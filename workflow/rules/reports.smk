@@ -31,6 +31,7 @@ rule track_cell:
         f"{RESULTS}/tracked/{AXES}.json",
     log:
         f"{RESULTS}/logs/track/{AXES}.log",
+    priority: 60
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,
@@ -58,6 +59,7 @@ rule track:
         f"{RESULTS}/tracked.json",
     log:
         f"{RESULTS}/logs/track.log",
+    priority: 10  # the longest of what is done at the end
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,

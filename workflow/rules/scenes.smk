@@ -8,6 +8,7 @@ rule study:
         f"{RESULTS}/study.json",
     log:
         f"{RESULTS}/logs/study.log",
+    priority: 100
     localrule: True
     params:
         study=GIVEN,
@@ -26,6 +27,7 @@ rule describe:
         f"{RESULTS}/scenes/{{scene}}.json",
     log:
         f"{RESULTS}/logs/describe/{{scene}}.log",
+    priority: 30  # it takes a second, and a study that was stopped is reported with it
     params:
         width=WIRING.truth_width,
         dataset=WIRING.dataset,
@@ -45,6 +47,7 @@ rule features:
         f"{RESULTS}/logs/features/{{scene}}.log",
     benchmark:
         f"{RESULTS}/benchmarks/features/{{scene}}.tsv"
+    priority: 10
     threads: SETTINGS.compute.threads
     resources:
         gpu=WIRING.encoder_gpu,
@@ -56,21 +59,23 @@ rule features:
         "viewbench features {wildcards.scene:q} --encoder {params.encoder:q} --out {output:q} > /dev/null 2> {log:q}"
 
 
-# These two run again exactly when the trainings, and the selections, do that wait for them.
+# These two run again exactly when the trainings, and the selections, do that wait for them. What a study calls by two
+# names is compiled once.
 rule warm:
     input:
-        WIRING.training,
+        WIRING.training_compiled,
     output:
-        touch(f"{RESULTS}/warm/{{backend}}"),
+        touch(f"{RESULTS}/warm/{{trainer}}"),
     log:
-        f"{RESULTS}/logs/warm/{{backend}}.log",
+        f"{RESULTS}/logs/warm/{{trainer}}.log",
+    priority: 100
     # CUDA code is compiled for the device that is there.
     resources:
-        gpu=WIRING.gpu,
+        gpu=WIRING.warm_gpu,
     params:
-        backend=lambda wildcards: STUDY.backend(wildcards.backend).backend,
+        backend=lambda wildcards: WIRING.trainers[wildcards.trainer],
     message:
-        "prepare backend {wildcards.backend}"
+        "prepare backend {wildcards.trainer}"
     shell:
         "viewbench warm --backend {params.backend:q} 2> {log:q}"
 
@@ -82,6 +87,7 @@ rule warm_selector:
         touch(f"{RESULTS}/warm_selectors/{{plugin}}"),
     log:
         f"{RESULTS}/logs/warm_selectors/{{plugin}}.log",
+    priority: 90
     message:
         "prepare selector {wildcards.plugin}"
     shell:
