@@ -23,6 +23,7 @@ models = numba.extending.models
 
 COUNT = 16
 _FLOAT, _INT = ir.FloatType(), ir.IntType(32)
+_QUARTER = ir.VectorType(_FLOAT, 4)
 _VECTOR, _INTS, _BITS = ir.VectorType(_FLOAT, COUNT), ir.VectorType(_INT, COUNT), ir.VectorType(ir.IntType(1), COUNT)
 
 
@@ -143,6 +144,42 @@ def load_row(typingctx, array, row, column):
         return builder.load(_as_vector(builder, _place(context, builder, sig, args, 0, (1, 2))), align=4)
 
     return LANES(array, row, column), build
+
+
+def _quarters(context, builder, sig, args):
+    """Addresses of four rows of 4 elements: `at`, and from there on by `stride`, in a one-dimensional array."""
+    first = _place(context, builder, sig, args, 0, (1,))
+    stride = context.cast(builder, args[2], sig.args[2], types.intp)
+    rows = [builder.gep(first, [builder.mul(stride, ir.Constant(stride.type, k))]) for k in range(4)]
+    return [builder.bitcast(row, _QUARTER.as_pointer()) for row in rows]
+
+
+@intrinsic
+def load_square(typingctx, array, at, stride):
+    """4 x 4 elements, row by row: 4 from `at` on, and from `stride`, 2 `stride`, 3 `stride` behind it."""
+
+    def build(context, builder, sig, args):
+        rows = [builder.load(address, align=4) for address in _quarters(context, builder, sig, args)]
+        eight = ir.VectorType(_INT, 8)
+        upper = builder.shuffle_vector(rows[0], rows[1], _constant(eight, range(8)))
+        lower = builder.shuffle_vector(rows[2], rows[3], _constant(eight, range(8)))
+        return builder.shuffle_vector(upper, lower, _constant(_INTS, range(COUNT)))
+
+    return LANES(array, at, stride), build
+
+
+@intrinsic
+def store_square(typingctx, array, at, stride, value):
+    """Writes 4 x 4 elements, row by row, as `load_square` reads them."""
+
+    def build(context, builder, sig, args):
+        four = ir.VectorType(_INT, 4)
+        for k, address in enumerate(_quarters(context, builder, sig, args)):
+            row = builder.shuffle_vector(args[3], args[3], _constant(four, range(4 * k, 4 * k + 4)))
+            builder.store(row, address, align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, at, stride, LANES), build
 
 
 @intrinsic
@@ -329,26 +366,31 @@ def shifted(typingctx, a, b, by):
 
 @intrinsic
 def sums(typingctx, vectors):
-    """Lane j is the sum of the lanes of vector j of a tuple of at most 16, the others 0; halves are added to halves."""
+    """Lane j is the sum of the lanes of vector j of a tuple of 8 or 9, the others 0; halves are added to halves."""
     count = len(vectors)
+    if count not in (8, 9):
+        raise numba.core.errors.TypingError("sums of 8 or 9 vectors")
 
     def build(context, builder, sig, args):
-        zero = _constant(_VECTOR, [0.0] * COUNT)
-        left = [builder.extract_value(args[0], j) for j in range(count)] + [None] * (COUNT - count)
-        width = COUNT // 2
-        while width:
-            left = [_folded(builder, left[j], left[j + width], width, zero) for j in range(width)]
-            width //= 2
-        return left[0]
+        left = [builder.extract_value(args[0], j) for j in range(count)]
+        ninth = left.pop() if count == 9 else _constant(_VECTOR, [0.0] * COUNT)
+        for width in (8, 4, 2):
+            half = len(left) // 2
+            left = [_folded(builder, left[j], left[j + half], width) for j in range(half)]
+            swapped = [(lane + width) % COUNT for lane in range(COUNT)]
+            ninth = builder.fadd(ninth, builder.shuffle_vector(ninth, ninth, _constant(_INTS, swapped)))
+        # Now two lanes a sum: of the eight in the order of their numbers' bits, of the ninth in every pair.
+        even = [*range(0, COUNT, 2), *[COUNT] * 8]
+        odd = [*range(1, COUNT, 2), *[COUNT + 1] * 8]
+        both = [builder.shuffle_vector(left[0], ninth, _constant(_INTS, lanes)) for lanes in (even, odd)]
+        kept = _constant(_BITS, [1] * count + [0] * (COUNT - count))
+        return builder.select(kept, builder.fadd(*both), _constant(_VECTOR, [0.0] * COUNT))
 
     return LANES(vectors), build
 
 
-def _folded(builder, a, b, width, zero):
+def _folded(builder, a, b, width):
     """Of groups of 2 `width` lanes, the halves added; the group of b goes behind that of a."""
-    if a is None:
-        return None
-    b = zero if b is None else b
     low, high = [], []
     for group in range(0, COUNT, 2 * width):
         for vector in (0, COUNT):
@@ -369,6 +411,7 @@ def aligned(array):
 _P0, _P1, _P2, _P3, _P4, _P5 = (
     np.float32(c) for c in (1.0, 0.69314698, 0.24022242, 0.055507337, 0.0096715126, 0.0013264727)
 )
+_S1, _S2, _S3, _S4 = (np.float32(c) for c in (0.69312419, 0.2402411, 0.055906425, 0.0095828531))
 _MAGIC = np.float32(1.5 * 2**23)
 _ROOT2 = np.float32(2**0.5)
 _L1, _L3, _L5, _L7, _L9 = (np.float32(2 / np.log(2) / k) for k in (1, 3, 5, 7, 9))
@@ -384,6 +427,17 @@ def exp2(x):
     p = fma(f, p, spread(_P3))
     p = fma(f, p, spread(_P2))
     p = fma(f, p, spread(_P1))
+    return times_power(fma(f, p, spread(_P0)), magic)
+
+
+@written
+def exp2_short(x):
+    """2^x for x in [-126, 126], to 3e-6 of it."""
+    magic = x + _MAGIC
+    f = x - (magic - _MAGIC)
+    p = fma(f, spread(_S4), spread(_S3))
+    p = fma(f, p, spread(_S2))
+    p = fma(f, p, spread(_S1))
     return times_power(fma(f, p, spread(_P0)), magic)
 
 

@@ -43,14 +43,15 @@ class Slots(NamedTuple):
     first: np.ndarray  # (N,) int32, where a Gaussian's slots begin
     number: np.ndarray  # (N,) int32, how many there are, 0 for those that are not drawn
     tile: np.ndarray  # (P,) int32, by slot
-    splat: np.ndarray  # (P,) int32 place among the splats, by slot
-    quarters: np.ndarray  # (P,) uint8, by slot: bits of those touched, upper left, upper right, lower left, lower right
+    # (P,) int32, by slot: the place among the splats, in the last 4 bits which quarters are touched: upper left, upper
+    # right, lower left, lower right.
+    splat: np.ndarray
 
     @classmethod
     def zeros(cls, capacity: int, pairs: int) -> "Slots":
         """Room for so many Gaussians and pairs."""
         first, number = np.zeros(capacity, np.int32), np.zeros(capacity, np.int32)
-        return cls(first, number, np.zeros(pairs, np.int32), np.zeros(pairs, np.int32), np.zeros(pairs, np.uint8))
+        return cls(first, number, np.zeros(pairs, np.int32), np.zeros(pairs, np.int32))
 
 
 class Tiles(NamedTuple):
@@ -171,21 +172,24 @@ def fill_slots(order, splats, slots, tiles, part, first, last):
                 k = 2 * (tile_row - group)
                 begin_0, begin_1 = max(-edges[ROWS + k], 0), max(-edges[ROWS + k + 1], 0)
                 end_0, end_1 = min(edges[k], width - 1), min(edges[k + 1], width - 1)
-                begin_0, end_0 = (begin_0 // QUARTER, end_0 // QUARTER) if begin_0 <= end_0 else (NOWHERE, -1)
-                begin_1, end_1 = (begin_1 // QUARTER, end_1 // QUARTER) if begin_1 <= end_1 else (NOWHERE, -1)
-                end = max(end_0, end_1) // 2 + 1
-                for start in range(min(begin_0, begin_1) // 2, end, AT_ONCE):
-                    above, below = _word(begin_0, end_0, 2 * start), _word(begin_1, end_1, 2 * start)
-                    for column in range(start, min(start + AT_ONCE, end)):
+                # From here on in quarters; shifts, since // minds signs.
+                begin_0, end_0 = (begin_0 >> 2, end_0 >> 2) if begin_0 <= end_0 else (NOWHERE, -1)
+                begin_1, end_1 = (begin_1 >> 2, end_1 >> 2) if begin_1 <= end_1 else (NOWHERE, -1)
+                column, end = min(begin_0, begin_1) >> 1, max(end_0, end_1) >> 1
+                while column <= end:
+                    above, below = _word(begin_0, end_0, 2 * column), _word(begin_1, end_1, 2 * column)
+                    stop = min(column + AT_ONCE, end + 1)
+                    tile, stop = tile_row * across + column, tile_row * across + stop
+                    column += AT_ONCE
+                    while tile < stop:
                         quarters = (above & 3) | ((below & 3) << 2)
+                        if quarters:
+                            slots.tile[slot], slots.splat[slot] = tile, i << 4 | quarters
+                            counts[tile] += 1
+                            slot += 1
                         above >>= 2
                         below >>= 2
-                        if quarters == 0:
-                            continue
-                        tile = tile_row * across + column
-                        slots.tile[slot], slots.splat[slot], slots.quarters[slot] = tile, i, quarters
-                        counts[tile] += 1
-                        slot += 1
+                        tile += 1
         slots.number[gaussian] = slot - begin
 
 

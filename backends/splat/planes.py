@@ -11,7 +11,7 @@ class Planes:
     def __init__(self, width: int, height: int):
         self.width, self.height = width, height
         self.stride = -(-(width + 2 * RADIUS) // 16) * 16
-        self.rows = height + 2 * RADIUS
+        self.rows = height + 2 * RADIUS + 2  # tiles of 8 pixels may reach 7 beyond the picture, and are read whole
         self.size = self.rows * self.stride
 
     def zeros(self, count: int) -> np.ndarray:

@@ -4,7 +4,7 @@ C = Σᵢ cᵢ αᵢ Tᵢ with Tᵢ = Πⱼ₍ⱼ₌₁..ᵢ₋₁₎ (1 - αⱼ
 
 The backward pass goes front to back too. With G the image gradient at a pixel and B the background, ⟨G, C⟩ is known
 from the forward pass, so the part of it that lies behind splat i is found by subtraction as one scalar:
-∂L/∂αᵢ · αᵢ = wᵢ ⟨G, cᵢ⟩ - (⟨G, C⟩ behind i) αᵢ / (1 - αᵢ), wᵢ = αᵢ Tᵢ.
+∂L/∂αᵢ · αᵢ = wᵢ (⟨G, cᵢ⟩ - (⟨G, C⟩ behind i) / Tᵢ₊₁), wᵢ = αᵢ Tᵢ.
 """
 
 import numpy as np
@@ -14,23 +14,27 @@ from ...common.lanes import (
     aligned,
     bits,
     dot,
-    exp2,
+    exp2_short,
     fma,
     load,
+    load_square,
     lowest,
     smaller,
     spread,
     store,
     store_row,
+    store_square,
     sums,
     where,
 )
 from .binning import QUARTER
 from .kernels import HALF, ONE, ZERO, F
+from .planes import RADIUS
 from .projection import BLUE, GREEN, LOG2_OPACITY, MIN_ALPHA_LOG2, RED, TILE, A, B, C, X, Y
 
 LOG2_MAX_ALPHA = F(-0.01449956969)  # log2 0.99
 OPAQUE = F(1e-4)  # transmittance below which nothing behind is seen; a tile stops when all its pixels are there
+FAINT = F(1e-30)  # added to a transmittance before it divides: behind many opaque splats it is 0
 PIXELS = TILE * TILE  # of a tile: its quarters' one behind the other, 16 each
 # Places in a tile's working memory, PIXELS floats each.
 T, SUM_R, SUM_G, SUM_B, BEHIND = (PIXELS * place for place in range(5))
@@ -55,7 +59,8 @@ def _alpha(x, y, a, b, c, opacity):
     """Alpha of 16 pixels at (x, y) from the mean, and its log2 before it is cut."""
     across = fma(a, x, b * y)
     e = fma(-x, across, fma(-(c * y), y, opacity))
-    return where(e > -MIN_ALPHA_LOG2, exp2(smaller(e, spread(LOG2_MAX_ALPHA))), spread(ZERO)), e
+    below = smaller(e, spread(LOG2_MAX_ALPHA)) if opacity > LOG2_MAX_ALPHA else e
+    return where(e > -MIN_ALPHA_LOG2, exp2_short(below), spread(ZERO)), e
 
 
 @written
@@ -66,10 +71,10 @@ def _opaque(memory, own):
 
 
 @exact
-def render(drawn, slots, tiles, background, image, first, last):
-    """Draws splats (N, SPLAT_COLUMNS) in tiles `first` to `last` of image (3, H, W); sets where tiles' lists stop.
+def render(drawn, slots, tiles, background, image, stride, first, last):
+    """Draws splats (N, SPLAT_COLUMNS) in tiles `first` to `last` of an image; sets where tiles' lists stop.
 
-    `background` (3,) is what is behind all of them.
+    It lies in padded planes (3, size) with rows of `stride`; `background` (3,) is what is behind all of them.
     """
     width, height, lists, starts, stops, _ = tiles
     across = (width + TILE - 1) // TILE
@@ -88,7 +93,7 @@ def render(drawn, slots, tiles, background, image, first, last):
         k = begin
         while k < end:
             slot = lists[k]
-            i, quarters = slots.splat[slot], np.int64(slots.quarters[slot])
+            i, quarters = slots.splat[slot] >> 4, np.int64(slots.splat[slot] & 15)
             k += 1
             x, y, a, b, c = left - drawn[i, X], upper - drawn[i, Y], drawn[i, A], drawn[i, B], drawn[i, C]
             opacity = drawn[i, LOG2_OPACITY]
@@ -108,45 +113,49 @@ def render(drawn, slots, tiles, background, image, first, last):
             if (k - begin) & 3 == 0 and _opaque(memory, own):
                 break
         stops[tile] = k
-        for row in range(min(TILE, height - y0)):
-            for column in range(min(TILE, width - x0)):
-                p = own + 32 * (row // QUARTER) + 16 * (column // QUARTER) + QUARTER * (row & 3) + (column & 3)
-                rest = memory[T + p]
-                image[0, y0 + row, x0 + column] = memory[SUM_R + p] + rest * background[0]
-                image[1, y0 + row, x0 + column] = memory[SUM_G + p] + rest * background[1]
-                image[2, y0 + row, x0 + column] = memory[SUM_B + p] + rest * background[2]
+        for q in range(4):
+            x, y, p = x0 + QUARTER * (q & 1), y0 + QUARTER * (q >> 1), own + 16 * q
+            at, rest = (y + RADIUS) * stride + x + RADIUS, load(memory, T + p)
+            whole = x + QUARTER <= width and y + QUARTER <= height
+            for c in range(3):
+                value = fma(rest, background[c], load(memory, SUM_R + c * PIXELS + p))
+                if whole:
+                    store_square(image[c], at, stride, value)
+                    continue
+                store(memory, SUM_R + c * PIXELS + p, value)
+                for row in range(min(QUARTER, height - y)):
+                    for column in range(min(QUARTER, width - x)):
+                        image[c, at + row * stride + column] = memory[SUM_R + c * PIXELS + p + QUARTER * row + column]
 
 
 @exact
-def render_backward(drawn, slots, tiles, image, image_gradient, pair_gradient, first, last):
-    """Fills pair_gradient (P, PAIR_COLUMNS), by slot, from the image (3, H, W) and its gradient.
+def render_backward(drawn, slots, tiles, image, image_gradient, stride, pair_gradient, first, last):
+    """Fills pair_gradient (P, PAIR_COLUMNS), by slot, for the pairs of tiles `first` to `last`.
 
-    It does so for the pairs of tiles `first` to `last`.
+    The image and its gradient, which is 0 around it, lie in padded planes (3, size) with rows of `stride`.
     """
-    width, height, lists, starts, stops, _ = tiles
-    across = (width + TILE - 1) // TILE
+    lists, starts, stops = tiles.lists, tiles.starts, tiles.stops
+    across = (tiles.width + TILE - 1) // TILE
     memory = np.empty(5 * PIXELS + 16, np.float32)
     own = aligned(memory)
     columns, rows = _places()
     for tile in range(first, last):
         x0, y0 = (tile % across) * TILE, (tile // across) * TILE
         left, upper = F(x0) + HALF, F(y0) + HALF
-        for p in range(own, own + PIXELS, 16):
+        for q in range(4):
+            p = own + 16 * q
+            at = (y0 + QUARTER * (q >> 1) + RADIUS) * stride + x0 + QUARTER * (q & 1) + RADIUS
+            r, g = load_square(image_gradient[0], at, stride), load_square(image_gradient[1], at, stride)
+            b_ = load_square(image_gradient[2], at, stride)
+            red, green = load_square(image[0], at, stride), load_square(image[1], at, stride)
             store(memory, T + p, spread(ONE))
-            store(memory, SUM_R + p, spread(ZERO))
-            store(memory, SUM_G + p, spread(ZERO))
-            store(memory, SUM_B + p, spread(ZERO))
-            store(memory, BEHIND + p, spread(ZERO))
-        for row in range(min(TILE, height - y0)):
-            for column in range(min(TILE, width - x0)):
-                p = own + 32 * (row // QUARTER) + 16 * (column // QUARTER) + QUARTER * (row & 3) + (column & 3)
-                y_, x_ = y0 + row, x0 + column
-                r, g, b_ = image_gradient[0, y_, x_], image_gradient[1, y_, x_], image_gradient[2, y_, x_]
-                memory[SUM_R + p], memory[SUM_G + p], memory[SUM_B + p] = r, g, b_
-                memory[BEHIND + p] = r * image[0, y_, x_] + g * image[1, y_, x_] + b_ * image[2, y_, x_]
+            store(memory, SUM_R + p, r)
+            store(memory, SUM_G + p, g)
+            store(memory, SUM_B + p, b_)
+            store(memory, BEHIND + p, dot(r, red, g, green, b_, load_square(image[2], at, stride)))
         for k in range(starts[tile], stops[tile]):
             slot = lists[k]
-            i, quarters = slots.splat[slot], np.int64(slots.quarters[slot])
+            i, quarters = slots.splat[slot] >> 4, np.int64(slots.splat[slot] & 15)
             x, y, a, b, c = left - drawn[i, X], upper - drawn[i, Y], drawn[i, A], drawn[i, B], drawn[i, C]
             opacity = drawn[i, LOG2_OPACITY]
             red, green, blue = drawn[i, RED], drawn[i, GREEN], drawn[i, BLUE]
@@ -159,12 +168,15 @@ def render_backward(drawn, slots, tiles, image, image_gradient, pair_gradient, f
                 alpha, e = _alpha(dx, dy, a, b, c, opacity)
                 through = load(memory, T + p)
                 weight = alpha * through
-                store(memory, T + p, through - weight)
+                through = through - weight
+                store(memory, T + p, through)
                 by_r, by_g, by_b = load(memory, SUM_R + p), load(memory, SUM_G + p), load(memory, SUM_B + p)
-                ours = weight * dot(by_r, red, by_g, green, by_b, blue)
-                behind = load(memory, BEHIND + p) - ours
+                colour = dot(by_r, red, by_g, green, by_b, blue)
+                behind = fma(-weight, colour, load(memory, BEHIND + p))
                 store(memory, BEHIND + p, behind)
-                s = where(e < LOG2_MAX_ALPHA, ours - behind * alpha / (ONE - alpha), spread(ZERO))
+                s = weight * (colour - behind / (through + FAINT))
+                if opacity > LOG2_MAX_ALPHA:
+                    s = where(e < LOG2_MAX_ALPHA, s, spread(ZERO))
                 sx, sy = s * dx, s * dy
                 s_0, s_x, s_y = s_0 + s, s_x + sx, s_y + sy
                 s_xx, s_xy, s_yy = fma(sx, dx, s_xx), fma(sx, dy, s_xy), fma(sy, dy, s_yy)

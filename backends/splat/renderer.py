@@ -65,7 +65,7 @@ class Renderer:
         self.pairs = place_lists(used)
         team.each(lambda *part: fill_lists(order, splats, slots, used, *part), parts)
         team.each(
-            lambda first, last: render(splats.drawn, slots, tiles, self.background, self.image, first, last),
+            lambda *ends: render(splats.drawn, slots, tiles, self.background, self.padded, self.planes.stride, *ends),
             team.shares(tiles.starts),
         )
         return self.image

@@ -59,13 +59,14 @@ class Trainer:
         if len(self.pair_gradient) != pairs:
             self.pair_gradient = np.zeros((pairs, PAIR_COLUMNS), np.float32)
         drawn, slots, tiles, view = r.splats.drawn, r.slots, r.tiles, r.view(camera)
-        image, by_image, by_pair, out = r.image, self.image_gradient, self.pair_gradient, self.gradient
+        image, by_image, stride = r.padded, self.padded_gradient, r.planes.stride
+        by_pair, out = self.pair_gradient, self.gradient
         self.team.each(
-            lambda first, last: render_backward(drawn, slots, tiles, image, by_image, by_pair, first, last),
+            lambda *ends: render_backward(drawn, slots, tiles, image, by_image, stride, by_pair, *ends),
             self.team.shares(tiles.starts),
         )
         self.team.each(
-            lambda first, last: project_backward(gaussians, view, slots, by_pair, out, first, last),
+            lambda *ends: project_backward(gaussians, view, slots, by_pair, out, *ends),
             self.team.blocks(n),
         )
         return out[:, :n]
