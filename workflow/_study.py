@@ -28,6 +28,7 @@ class SelectorEntry:
     name: str
     selector: str
     parameters: dict[str, Any] = field(default_factory=dict)
+    seeds: tuple[int, ...] = ()  # those of the study's that it is trained with; none for all
 
     @property
     def seeded(self) -> bool:
@@ -77,7 +78,7 @@ class Study:
     ratios: tuple[float, ...]
     seeds: tuple[int, ...]
     backends: tuple[BackendEntry, ...]
-    reference: bool
+    reference: tuple[int, ...]  # seeds of the trainings on every view
     count: str  # how a ratio becomes a number of views: selectors/_run.py
     encoder: str
     reports: tuple[str, ...]
@@ -101,7 +102,7 @@ class Study:
     def cells(self) -> list[dict[str, str]]:
         """One row a cell, all values as the folders under `cells/` spell them.
 
-        Every selector, and the full-data reference, is trained with every seed: also where the choice is always the
+        Every selector, and the full-data reference, is trained with several seeds: also where the choice is always the
         same, its score has a spread.
         """
         rows = []
@@ -115,9 +116,12 @@ class Study:
                             _row(backend.name, scene, entry.name, ratio, seed)
                             for ratio in part.get("ratios", self.ratios)
                             for seed in seeds
+                            if seed in (entry.seeds or seeds)
                         ]
-                if part.get("reference", self.reference):
-                    rows += [_row(backend.name, scene, REFERENCE, 1.0, seed) for seed in seeds]
+                if part.get("reference", True):
+                    rows += [
+                        _row(backend.name, scene, REFERENCE, 1.0, seed) for seed in seeds if seed in self.reference
+                    ]
         return rows
 
     def record(self) -> dict[str, Any]:
@@ -188,6 +192,10 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
         if backend.iterations is None and backend.seconds is None:
             raise UserError(f"study '{path}': backend '{backend.name}' has no budget; give iterations or seconds")
         _check_grid(backend, raw, [entry.name for entry in selectors], path)
+    for name, seeds in (*((entry.name, entry.seeds) for entry in selectors), ("reference", _reference(raw))):
+        missing = [seed for seed in seeds if seed not in _seeds(raw["seeds"])]
+        if missing:
+            raise UserError(f"study '{path}': '{name}' has seed {missing[0]}, which the study does not have")
     for name in SHARED:
         if name in raw and not any(name in backend.options for backend in backends):
             raise UserError(f"study '{path}': '{name}' is set, and none of its backends has it; leave it out")
@@ -205,7 +213,7 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
         ratios=tuple(float(ratio) for ratio in raw["ratios"]),
         seeds=_seeds(raw["seeds"]),
         backends=backends,
-        reference=raw.get("reference", True),
+        reference=_reference(raw),
         count=raw.get("count", "round"),
         encoder=raw.get("encoder", settings.features.encoder),
         reports=tuple(reports),
@@ -216,7 +224,15 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
 def _selector(entry: str | dict) -> SelectorEntry:
     if isinstance(entry, str):
         return SelectorEntry(entry, entry)
-    return SelectorEntry(entry.get("name", entry["selector"]), entry["selector"], entry.get("parameters", {}))
+    seeds = _seeds(entry["seeds"]) if "seeds" in entry else ()
+    return SelectorEntry(entry.get("name", entry["selector"]), entry["selector"], entry.get("parameters", {}), seeds)
+
+
+def _reference(raw: dict[str, Any]) -> tuple[int, ...]:
+    given = raw.get("reference", True)
+    if isinstance(given, bool):
+        return _seeds(raw["seeds"]) if given else ()
+    return _seeds(given)
 
 
 def _backend(entry: str | dict, raw: dict, settings: Settings) -> BackendEntry:

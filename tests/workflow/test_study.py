@@ -56,6 +56,22 @@ def test_a_backend_may_run_a_part_of_the_grid(load):
         load(backends=[{"backend": "splat", "grid": {"selectors": ["coverge"]}}])
 
 
+def test_a_selector_and_the_reference_may_have_fewer_seeds(load):
+    fewer = ["random", {"selector": "coverage", "seeds": 2}]
+    study = load(selectors=fewer, seeds=[4, 0, 1], reference=[4])
+    found = {name: {cell["seed"] for cell in study.cells() if cell["selector"] == name} for name in ("random", "full")}
+    assert found == {"random": {"0", "1", "4"}, "full": {"4"}}
+    assert {cell["seed"] for cell in study.cells() if cell["selector"] == "coverage"} == {"0", "1"}
+    part = {"selectors": ["coverage"], "seeds": [4, 1]}
+    both = load(selectors=fewer, seeds=[4, 0, 1], backends=[{"backend": "splat", "grid": part}], reference=False)
+    assert {cell["seed"] for cell in both.cells()} == {"1"}
+    assert not load(reference=False).reference
+    assert load(reference=True).reference == (0, 1, 2)
+    for wrong in ({"selectors": [{"selector": "coverage", "seeds": 4}]}, {"reference": 4}):
+        with pytest.raises(UserError, match="'(coverage|reference)' has seed 3, which the study does not have"):
+            load(**wrong)
+
+
 def test_words_that_backends_share_are_set_in_one_line(load):
     study = load(backends=["splat", "gsplat", "instant-ngp"], background=0.5, sh_degree=0, gaussians=900)
     one, other, none = (entry.options for entry in study.backends)
