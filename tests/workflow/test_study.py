@@ -68,7 +68,7 @@ def test_a_selector_and_the_reference_may_have_fewer_seeds(load):
     assert not load(reference=False).reference
     assert load(reference=True).reference == (0, 1, 2)
     for wrong in ({"selectors": [{"selector": "coverage", "seeds": 4}]}, {"reference": 4}):
-        with pytest.raises(UserError, match="'(coverage|reference)' has seed 3, which the study does not have"):
+        with pytest.raises(UserError, match=r"'(coverage|reference)' has seed 3, which the study does not have"):
             load(**wrong)
 
 
