@@ -67,6 +67,7 @@ bench: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_selectors.py $(BENCH)
 	$(THREADS) $(BIN)/python tests/bench/bench_splat.py $(BENCH)
 	$(THREADS) $(BIN)/python tests/bench/bench_encoder.py $(BENCH)
+	$(THREADS) $(BIN)/python tests/bench/bench_threads.py $(BENCH)
 
 gpu:
 	@if nvidia-smi -L > /dev/null 2>&1; then $(MAKE) dev && $(BIN)/python -m tests.gpu $(GPU); \

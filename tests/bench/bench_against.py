@@ -72,6 +72,7 @@ def main() -> None:
     parser.add_argument("--iterations", type=int, default=1000)
     parser.add_argument("--seconds", type=float, help="budget of both, instead of iterations")
     parser.add_argument("--cases", default=CASES, help="SCENE:WIDTH:VIEWS,...")
+    parser.add_argument("--warm", type=int, default=1, help="rounds before, which compile and read what is cached later")
     asked = parser.parse_args()
     budget = ["--seconds", str(asked.seconds)] if asked.seconds else ["--iterations", str(asked.iterations)]
     other = asked.other.resolve()
@@ -86,7 +87,7 @@ def main() -> None:
         scene, width, count = text.split(":")
         case = scene, int(width), int(count)
         rows: tuple[list, list] = ([], [])
-        for number in range(-1, asked.rounds):  # the first of each compiles and reads what is cached later
+        for number in range(-asked.warm, asked.rounds):
             for checkout, row in zip((HERE, other), rows, strict=True):
                 found = run(checkout, case, budget, max(number, 0), asked.seconds is not None or number == 0)
                 if number >= 0:
