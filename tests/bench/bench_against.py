@@ -72,7 +72,9 @@ def main() -> None:
     parser.add_argument("--iterations", type=int, default=1000)
     parser.add_argument("--seconds", type=float, help="budget of both, instead of iterations")
     parser.add_argument("--cases", default=CASES, help="SCENE:WIDTH:VIEWS,...")
-    parser.add_argument("--warm", type=int, default=1, help="rounds before, which compile and read what is cached later")
+    parser.add_argument(
+        "--warm", type=int, default=1, help="rounds before, which compile and read what is cached later"
+    )
     asked = parser.parse_args()
     budget = ["--seconds", str(asked.seconds)] if asked.seconds else ["--iterations", str(asked.iterations)]
     other = asked.other.resolve()

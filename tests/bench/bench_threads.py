@@ -55,7 +55,9 @@ def commands(threads: int, repeats: int) -> list[tuple[str, float, float]]:
     with tempfile.TemporaryDirectory() as folder:
         chosen = f"{folder}/selection.json"
         quiet = {"check": True, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        subprocess.run([*call, "select", "room_human", "--selector", "uniform", "--count", "40", "--selection", chosen], **quiet)
+        subprocess.run(
+            [*call, "select", "room_human", "--selector", "uniform", "--count", "40", "--selection", chosen], **quiet
+        )
         for _ in range(repeats):
             models = []
             for place, number in enumerate((1, threads)):
