@@ -88,3 +88,23 @@ def test_a_study_is_shown_with_its_defaults(capsys):
     assert status == 0
     assert shown["cells"] == 4
     assert shown["encoder"]
+
+
+def test_threads_change_the_time_and_no_number(capsys, small_room, tmp_path):
+    chosen = tmp_path / "selection.json"
+    assert run(capsys, "select", small_room, "--selector", "uniform", "--count", 6, "--selection", chosen)[0] == 0
+    found = []
+    for threads in (1, 3):
+        model = tmp_path / f"model{threads}"
+        asked = ["--selection", chosen, "--iterations", 12, "--width", 170, "--out", model, "--threads", threads]
+        assert run(capsys, "train", small_room, *asked)[0] == 0
+        assert run(capsys, "evaluate", model, small_room, "--out", model, "--threads", threads)[0] == 0
+        assert json.loads((model / "train.json").read_text())["threads"] == threads
+        files = [model / "model.ply", *sorted((model / "renders").iterdir())]
+        metrics = json.loads((model / "metrics.json").read_text())
+        found.append(([path.read_bytes() for path in files], metrics["views"], metrics["psnr_db"]))
+    assert len(found[0][0]) == 5
+    assert found[0] == found[1]
+    status, _, err = run(capsys, "train", small_room, *asked[:-1], 0)
+    assert status == 2
+    assert "--threads" in err
