@@ -153,7 +153,13 @@ def _grid_words(study: Study) -> str:
         "seed": len(study.seeds),
         "backend": len(study.backends),
     }
-    grid = " × ".join(f"{count} {what}{'s' if count != 1 else ''}" for what, count in counts.items())
+    words = {what: f"{count} {what}{'s' if count != 1 else ''}" for what, count in counts.items()}
+    seeds: dict[tuple[str, str], set[int]] = {}
+    for cell in study.cells:
+        seeds.setdefault((cell.backend, cell.selector), set()).add(cell.seed)
+    if any(len(found) < len(study.seeds) for found in seeds.values()):
+        words["seed"] = f"up to {words['seed']}"
+    grid = " × ".join(words.values())
     return f"{grid}: {len(study.done)} of {len(study.cells)} cells scored"
 
 

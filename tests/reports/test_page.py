@@ -1,6 +1,7 @@
 """The page: one file, well formed, that needs no network and says what the numbers say."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from tests.conftest import known
 from viewbench.common import plugins
 from viewbench.common.errors import UserError
-from viewbench.reports import _findings, _run, _study
+from viewbench.reports import _findings, _page, _run, _study
 from viewbench.reports._statistics import signed
 
 from .fixtures import make_study
@@ -171,3 +172,13 @@ def test_one_seed_draws_no_conclusion(tmp_path):
 def test_a_page_of_nothing_is_refused(tmp_path):
     with pytest.raises(UserError, match="no report of"):
         _run.page(make_study(tmp_path, scenes=("room_human",)))
+
+
+def test_seeds_that_not_every_selector_has_are_not_promised(tmp_path):
+    study = _study.load(make_study(tmp_path))
+    first = [cell for cell in study.cells if cell.selector == study.selectors[0] and cell.seed != study.seeds[0]]
+    assert first
+    fewer = replace(study, cells=tuple(cell for cell in study.cells if cell not in first))
+    words = f"{len(study.seeds)} seeds"
+    assert f"× {words}" in _page._grid_words(study)
+    assert f"× up to {words}" in _page._grid_words(fewer)
