@@ -2,6 +2,7 @@
 
 import functools
 import math
+import threading
 from pathlib import Path
 from typing import cast
 
@@ -72,8 +73,16 @@ def lpips(image: np.ndarray, truth: np.ndarray, weights: Path) -> float:
         return float(model(first, second))
 
 
-@functools.cache
+_making = threading.Lock()  # several threads may ask at once
+
+
 def _lpips_model(weights: Path):
+    with _making:
+        return _made_lpips_model(weights)
+
+
+@functools.cache
+def _made_lpips_model(weights: Path):
     import torch
 
     from ..common.torchvision_cpu import import_torchvision

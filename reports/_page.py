@@ -115,7 +115,7 @@ def _facts(study: Study) -> list[tuple[str, str]]:
         ("Backends", "; ".join(_backend_words(study, entry, trains) for entry in study.record["backends"])),
         (
             "Reference",
-            "a model on all views of each scene for every seed, same budget"
+            f"models on all views of each scene, {_seed_words(study, study.record['reference'])}, same budget"
             if study.record.get("reference")
             else "none",
         ),
@@ -161,6 +161,12 @@ def _grid_words(study: Study) -> str:
         words["seed"] = f"up to {words['seed']}"
     grid = " × ".join(words.values())
     return f"{grid}: {len(study.done)} of {len(study.cells)} cells scored"
+
+
+def _seed_words(study: Study, reference: bool | list[int]) -> str:
+    """ "3 seeds": of the reference, which may have fewer than the study."""
+    count = len(study.seeds) if reference is True else len(reference or [])
+    return f"{count} seed{'s' if count != 1 else ''}"
 
 
 def _scene_words(study: Study, scene: str) -> str:

@@ -220,10 +220,12 @@ def and_list(words: Iterable[str]) -> str:
 
 
 def selector_words(entry: dict[str, Any]) -> str:
-    """A selector of study.json for people: "maxmin", "logdet-sample (logdet, sample=True)"."""
+    """A selector of study.json for people: "maxmin", "logdet-sample (logdet, sample=True)", "coverage (3 seeds)"."""
     parts = [] if entry["selector"] == entry["name"] else [entry["selector"]]
     for key, value in (entry.get("parameters") or {}).items():
         parts.append(f"{key}={'+'.join(map(str, value)) if isinstance(value, list) else value}")
+    if entry.get("seeds"):
+        parts.append(f"{len(entry['seeds'])} seed{'s' if len(entry['seeds']) != 1 else ''}")
     return f"{entry['name']} ({', '.join(parts)})" if parts else entry["name"]
 
 

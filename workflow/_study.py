@@ -118,10 +118,10 @@ class Study:
                             for seed in seeds
                             if seed in (entry.seeds or seeds)
                         ]
-                if part.get("reference", True):
-                    rows += [
-                        _row(backend.name, scene, REFERENCE, 1.0, seed) for seed in seeds if seed in self.reference
-                    ]
+                wanted = part.get("reference")  # True: also where the study has none
+                if wanted is not False:
+                    asked = self.reference or (self.seeds if wanted else ())
+                    rows += [_row(backend.name, scene, REFERENCE, 1.0, seed) for seed in seeds if seed in asked]
         return rows
 
     def record(self) -> dict[str, Any]:
@@ -196,6 +196,11 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
         missing = [seed for seed in seeds if seed not in _seeds(raw["seeds"])]
         if missing:
             raise UserError(f"study '{path}': '{name}' has seed {missing[0]}, which the study does not have")
+    for backend in backends:
+        for entry in selectors:
+            runs = entry.name in backend.grid.get("selectors", [entry.name])
+            if runs and entry.seeds and not set(entry.seeds) & set(backend.grid.get("seeds", entry.seeds)):
+                raise UserError(f"study '{path}': backend '{backend.name}' has none of the seeds of '{entry.name}'")
     for name in SHARED:
         if name in raw and not any(name in backend.options for backend in backends):
             raise UserError(f"study '{path}': '{name}' is set, and none of its backends has it; leave it out")

@@ -1,9 +1,9 @@
 """Which splats touch which 8 x 8 tile, each tile's in order of depth.
 
 One radix sort of the visible splats by depth, then each splat is written to the tiles that its ellipse
-{d : dᵀ Q d < cut} touches, row of pixels by row of pixels, found exactly, with those 4 x 4 quarters of a tile that it
-touches; a counting fill keeps the depth order in each tile. Every (splat, tile) pair has a slot of its own for
-gradients, grouped by splat: no atomics, and the same bytes on every run and for any number of threads.
+{d : dᵀ Q d < cut} touches, row of quarters by row of quarters, with those 4 x 4 quarters of a tile that it touches; a
+counting fill keeps the depth order in each tile. Every (splat, tile) pair has a slot of its own for gradients, grouped by
+splat: no atomics, and the same bytes on every run and for any number of threads.
 """
 
 import math
@@ -156,7 +156,7 @@ def fill_slots(order, splats, slots, tiles, part, first, last):
         bottom = min(down - 1, math.floor((y + half_height - HALF) * inverse_tile))
         gaussian = splats.gaussian[i]
         slot = np.int64(slots.first[gaussian])
-        begin = slot
+        begin, limit = slot, slot + splats.most[i]  # beyond it are other slots: rounding of huge splats may lead there
         for group in range(top, bottom + 1, ROWS // 2):
             # What the ellipse spans in 8 rows of quarters, in whole pixels.
             upper = row_of + (F(TILE * group) + HALF - y)
@@ -183,7 +183,7 @@ def fill_slots(order, splats, slots, tiles, part, first, last):
                     column += AT_ONCE
                     while tile < stop:
                         quarters = (above & 3) | ((below & 3) << 2)
-                        if quarters:
+                        if quarters and slot < limit:
                             slots.tile[slot], slots.splat[slot] = tile, i << 4 | quarters
                             counts[tile] += 1
                             slot += 1

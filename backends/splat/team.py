@@ -1,7 +1,7 @@
 """Several threads for one picture: kernels run on ranges, and what they write does not depend on who takes which."""
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import pairwise
 from typing import Any
 
@@ -31,7 +31,10 @@ class Team:
                 task(*one)
 
         others = [self.pool.submit(work) for _ in range(self.threads - 1)]
-        work()
+        try:
+            work()
+        finally:
+            wait(others)  # also after an error: they write into what the caller will use again
         for other in others:
             other.result()
 

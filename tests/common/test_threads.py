@@ -1,6 +1,7 @@
 """Doing the same to many things with several threads: order, errors, how much is begun ahead."""
 
 import threading
+from typing import Any
 
 import pytest
 
@@ -35,7 +36,7 @@ def test_what_is_raised_comes_when_its_turn_does():
 def test_little_is_begun_before_its_turn(allowed):
     """Each thing that waits takes memory: of a thousand pictures a few are held."""
     asked = []
-    found = threads.over(lambda number: number, (asked.append(number) or number for number in range(100)))
+    found: Any = threads.over(lambda number: number, (asked.append(number) or number for number in range(100)))
     next(found)
     assert len(asked) <= 1 + threads.AHEAD * allowed
     found.close()  # what has begun ends, and nothing else begins

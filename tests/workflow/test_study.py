@@ -72,6 +72,19 @@ def test_a_selector_and_the_reference_may_have_fewer_seeds(load):
             load(**wrong)
 
 
+def test_a_backend_without_the_seeds_of_a_selector_is_refused(load):
+    late = [{"selector": "random", "seeds": [1, 2]}, "uniform"]
+    with pytest.raises(UserError, match="'splat' has none of the seeds of 'random'"):
+        load(selectors=late, backends=[{"backend": "splat", "grid": {"seeds": [0]}}])
+    assert load(selectors=late, backends=[{"backend": "splat", "grid": {"seeds": [0], "selectors": ["uniform"]}}])
+
+
+def test_a_backend_may_have_a_reference_where_the_study_has_none(load):
+    study = load(reference=False, backends=["splat", {"name": "b", "backend": "splat", "grid": {"reference": True}}])
+    found = {(cell["backend"], cell["seed"]) for cell in study.cells() if cell["selector"] == "full"}
+    assert found == {("b", "0"), ("b", "1"), ("b", "2")}
+
+
 def test_words_that_backends_share_are_set_in_one_line(load):
     study = load(backends=["splat", "gsplat", "instant-ngp"], background=0.5, sh_degree=0, gaussians=900)
     one, other, none = (entry.options for entry in study.backends)
