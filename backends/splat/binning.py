@@ -2,8 +2,8 @@
 
 One radix sort of the visible splats by depth, then each splat is written to the tiles that its ellipse
 {d : dᵀ Q d < cut} touches, row of quarters by row of quarters, with those 4 x 4 quarters of a tile that it touches; a
-counting fill keeps the depth order in each tile. Every (splat, tile) pair has a slot of its own for gradients, grouped by
-splat: no atomics, and the same bytes on every run and for any number of threads.
+counting fill keeps the depth order in each tile. Every (splat, tile) pair has a slot of its own for gradients, grouped
+by splat: no atomics, and the same bytes on every run and for any number of threads.
 """
 
 import math

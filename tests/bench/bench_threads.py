@@ -71,7 +71,7 @@ def commands(threads: int, repeats: int) -> list[tuple[str, float, float]]:
                 models.append(Path(model, "model.ply").read_bytes())
             if models[0] != models[1]:
                 raise SystemExit("several threads do not give the model of one")
-    return [(name, *(float(np.median(side)) for side in both)) for name, both in times.items()]
+    return [(name, float(np.median(one)), float(np.median(several))) for name, (one, several) in times.items()]
 
 
 def main() -> None:

@@ -217,6 +217,24 @@ def test_splats_at_one_depth():
     assert (renderer.slots.number > 0).sum() == renderer.visible > 0
 
 
+def test_no_splat_has_more_slots_than_its_own():
+    """Nothing checks bounds: rounding must not lead out of them where splats are larger than the picture by far."""
+    rng, n, f = np.random.default_rng(9), 4000, 100.0
+    z, size = rng.uniform(0.06, 0.2, n), np.exp(rng.uniform(0, 5, n))
+    edge = rng.uniform(0, 300, n)  # where the ellipse ends, in pixels
+    g = layout.empty(n, 1)
+    g[layout.MEAN : layout.MEAN + 3] = [(edge - 3.2 * f * size / z - 150) * z / f, 0 * z, z]
+    g[layout.LOG_SCALE : layout.LOG_SCALE + 3], g[layout.LOGIT] = np.log(size), 5
+    cam = np.array([1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, f, f, 150, 150, 0, 0, 0, 300, 300], np.float32)
+    renderer = Renderer(n, 300, 300, Rendering(NEAR))
+    assert np.isfinite(renderer.draw(g, cam)).all()
+    places = renderer.order.indices[: renderer.visible]
+    seen = renderer.splats.gaussian[places]
+    assert len(seen) > 100
+    assert (renderer.slots.number[seen] <= renderer.splats.most[places]).all()
+    assert renderer.slots.number.sum() == renderer.pairs
+
+
 def test_the_filter_keeps_a_small_splats_light():
     """A splat that shrinks below a pixel loses light with its area: with Mip-Splatting's filter, not with 3DGS's."""
     light = {name: [] for name in FILTERS}
