@@ -1,5 +1,6 @@
 """How many threads this process may use for one piece of work, and doing the same to many things with them."""
 
+import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -13,9 +14,16 @@ _allowed = 1
 
 
 def allow(count: int) -> None:
-    """Says how many it may use from now on; before that it is one."""
+    """Says how many it may use from now on, of the processors that it has; before that it is one."""
     global _allowed
-    _allowed = count
+    _allowed = max(1, min(count, processors()))
+
+
+def processors() -> int:
+    """How many this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def allowed() -> int:

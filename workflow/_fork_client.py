@@ -20,7 +20,24 @@ def run(arguments: list[str]) -> int | None:
     import json
     import socket
 
-    request = {"arguments": arguments, "folder": str(Path.cwd()), "environment": dict(os.environ)}
+    passed = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) != signal.SIG_IGN]
+    ignored = [int(number) for number in (signal.SIGINT, signal.SIGTERM) if number not in passed]
+    request = {
+        "arguments": arguments,
+        "folder": str(Path.cwd()),
+        "environment": dict(os.environ),
+        "ignored": ignored,
+    }
+    pid = ""
+
+    def pass_on(number: int, frame: object) -> None:
+        if not pid:
+            sys.exit(128 + number)  # which hangs up, and so ends the job
+        with contextlib.suppress(ProcessLookupError):  # it has just ended
+            os.killpg(int(pid), number)
+
+    for number in passed:
+        signal.signal(number, pass_on)
     content = json.dumps(request).encode()  # names that are not UTF-8 are escaped
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         try:
@@ -30,18 +47,13 @@ def run(arguments: list[str]) -> int | None:
             lines = connection.makefile("r")
             pid = lines.readline()
         except OSError:
-            return None
+            pid = ""
         if not pid:
+            for number in passed:
+                signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
             return None
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda number, frame: _pass_on(int(pid), number))
         status = lines.readline()
     if not status:
         print("viewbench: the process that ran this is gone", file=sys.stderr)
         return 1
     return int(status)
-
-
-def _pass_on(pid: int, number: int) -> None:
-    with contextlib.suppress(ProcessLookupError):  # it has just ended
-        os.killpg(pid, number)

@@ -30,17 +30,19 @@ from typing import Any, NoReturn
 from ._fork_client import ADDRESS, LENGTH
 
 PACKAGES = ("click", "numpy", "PIL.Image", "plyfile", "scipy.ndimage", "scipy.spatial", "skimage.metrics")
+LONGEST = 80  # bytes of a folder's name that leave room for that of a socket in it
 PATIENCE_S = 10.0  # for the rest of a request that has begun
 END_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
 def start(workflow: Any, threads: int) -> None:
     """Starts the server of this run, where it can have one; the jobs find it by a variable."""
-    if not (hasattr(os, "pidfd_open") and workflow.local_exec and threads == 1) or ADDRESS in os.environ:
+    if not (workflow.local_exec and threads == 1 and _watches()) or ADDRESS in os.environ:
         return
-    folder = tempfile.mkdtemp(prefix="viewbench-")
+    folder = tempfile.mkdtemp(prefix="viewbench-", dir=None if len(tempfile.gettempdir()) < LONGEST else "/tmp")
     address = str(Path(folder) / "jobs")
-    command = [sys.executable, "-m", __name__, address]
+    # -P: files in the folder of the results are no modules.
+    command = [sys.executable, "-P", "-m", __name__, address]
     server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
     os.environ[ADDRESS] = address
 
@@ -49,6 +51,15 @@ def start(workflow: Any, threads: int) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
     atexit.register(stop)
+
+
+def _watches() -> bool:
+    """Whether this system says when a process ends, as Linux does from 5.3 on where no sandbox forbids it."""
+    try:
+        os.close(os.pidfd_open(os.getpid()))
+    except (AttributeError, OSError):
+        return False
+    return True
 
 
 class Server:
@@ -85,15 +96,14 @@ class Server:
             pid = os.fork()
             if not pid:
                 run(request, fds)
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.setpgid(pid, pid)  # here too: signals may be passed on before the child has come to it
-            connection.sendall(f"{pid}\n".encode())
         except (OSError, ValueError):  # it went away
             connection.close()
             return
         finally:
             for fd in fds:
                 os.close(fd)
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.setpgid(pid, pid)  # here too: signals may be passed on before the child has come to it
         ended = os.pidfd_open(pid)
         self.pids.add(pid)
 
@@ -113,6 +123,8 @@ class Server:
             self.waiting.unregister(connection)
             _kill(pid)
 
+        with contextlib.suppress(OSError):  # where it has gone away meanwhile, `gone` is called next
+            connection.sendall(f"{pid}\n".encode())
         self.waiting.register(ended, selectors.EVENT_READ, reply)
         self.waiting.register(connection, selectors.EVENT_READ, gone)  # nothing is sent: it can only be closed
 
@@ -123,8 +135,8 @@ def run(request: dict[str, Any], fds: list[int]) -> NoReturn:
     try:
         os.setpgid(0, 0)  # what is passed on reaches the programs that it starts too
         ctypes.CDLL(None).prctl(END_WITH_PARENT, signal.SIGTERM)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
+            signal.signal(number, signal.SIG_IGN if number in request["ignored"] else usual)
         for number, fd in enumerate(fds):
             os.dup2(fd, number)
         os.closerange(3, max(fds, default=3) + 100)
@@ -138,7 +150,7 @@ def run(request: dict[str, Any], fds: list[int]) -> NoReturn:
 
         status = _main.run(request["arguments"])
     except SystemExit as error:
-        status = error.code if isinstance(error.code, int) else 1
+        status = error.code if isinstance(error.code, int) else int(error.code is not None)
     except BaseException:
         traceback.print_exc()
     finally:
@@ -179,3 +191,4 @@ if __name__ == "__main__":
     server = Server(sys.argv[1])
     prepare()
     server.serve()
+    shutil.rmtree(Path(sys.argv[1]).parent, ignore_errors=True)  # here too, since the run may have been killed

@@ -104,7 +104,8 @@ class Progress(logging.Handler):
         left = self.pace.seconds_left if self.done < self.cells else None
         if left is not None:
             parts.append(f"about {_clock(left)} left")
-        return f"{', '.join(parts)}; {self.pace.doing() or self.phase}"
+        doing = self.pace.doing() or (self.phase if not self.done or self.over.is_set() else "")
+        return ", ".join(parts) + (f"; {doing}" if doing else "")
 
     def _show(self, at_once: bool = False, final: bool = False) -> None:
         now = self.clock()
@@ -112,7 +113,7 @@ class Progress(logging.Handler):
             self.phase = "the report is there"
             self.over.set()
         if bool(getattr(self.stream, "isatty", lambda: False)()):
-            share = self.done / self.cells if self.cells else 0.0
+            share = self.done / self.cells if self.cells and self.pace.planned else 0.0
             line = f"[{'#' * round(BAR * share):<{BAR}}] {self.text()}"
             line = line[: max(BAR, shutil.get_terminal_size().columns - 1)]  # one that wraps cannot be drawn over
             print("\r" + line.ljust(self.width), end="\n" if final else "", file=self.stream, flush=True)

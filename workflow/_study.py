@@ -273,7 +273,8 @@ def _grid(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _seeds(given: int | list[int]) -> tuple[int, ...]:
-    return tuple(range(given)) if isinstance(given, int) else tuple(given)
+    # JSON's integers may be written 2.0.
+    return tuple(int(seed) for seed in given) if isinstance(given, list) else tuple(range(int(given)))
 
 
 def _check_grid(backend: BackendEntry, raw: dict, selectors: list[str], path: Path) -> None:

@@ -1,4 +1,4 @@
-"""3D Gaussian splatting on the CPU, one thread: trains from points, writes a model.ply that any splat viewer opens."""
+"""3D Gaussian splatting on the CPU: trains from points, writes a model.ply that any splat viewer opens."""
 
 import importlib.metadata
 from collections.abc import Iterator

@@ -12,8 +12,15 @@ from viewbench.common import threads
 def allowed(request):
     before = threads.allowed()
     threads.allow(request.param)
-    yield request.param
+    yield threads.allowed()
     threads.allow(before)
+
+
+def test_no_more_than_there_are_processors(allowed):
+    threads.allow(10**6)
+    assert threads.allowed() == threads.processors()
+    threads.allow(0)
+    assert threads.allowed() == 1
 
 
 def test_results_come_in_order(allowed):

@@ -66,6 +66,7 @@ def test_a_selector_and_the_reference_may_have_fewer_seeds(load):
     both = load(selectors=fewer, seeds=[4, 0, 1], backends=[{"backend": "splat", "grid": part}], reference=False)
     assert {cell["seed"] for cell in both.cells()} == {"1"}
     assert not load(reference=False).reference
+    assert load(seeds=3.0, reference=2.0).reference == (0, 1)
     assert load(reference=True).reference == (0, 1, 2)
     for wrong in ({"selectors": [{"selector": "coverage", "seeds": 4}]}, {"reference": 4}):
         with pytest.raises(UserError, match=r"'(coverage|reference)' has seed 3, which the study does not have"):
