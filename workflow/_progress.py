@@ -72,6 +72,7 @@ class Progress(logging.Handler):
             self.pace.begin(job["jobid"], job["rule_name"], dict(job.get("wildcards") or {}))
         elif event == "JOB_FINISHED":
             rule = self.pace.end(getattr(record, "job_id", -1))
+            self.phase = "looking for what is next"
             self._show(final=rule == "page")
         elif event == "JOB_ERROR":
             self._fail(record)
@@ -104,8 +105,7 @@ class Progress(logging.Handler):
         left = self.pace.seconds_left if self.done < self.cells else None
         if left is not None:
             parts.append(f"about {_clock(left)} left")
-        doing = self.pace.doing() or (self.phase if not self.done or self.over.is_set() else "")
-        return ", ".join(parts) + (f"; {doing}" if doing else "")
+        return f"{', '.join(parts)}; {self.pace.doing() or self.phase}"
 
     def _show(self, at_once: bool = False, final: bool = False) -> None:
         now = self.clock()
