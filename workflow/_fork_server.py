@@ -32,6 +32,7 @@ from ._fork_client import ADDRESS, LENGTH
 PACKAGES = ("click", "numpy", "PIL.Image", "plyfile", "scipy.ndimage", "scipy.spatial", "skimage.metrics")
 LONGEST = 80  # bytes of a folder's name that leave room for that of a socket in it
 PATIENCE_S = 10.0  # for the rest of a request that has begun
+PASSED_ON = (signal.SIGINT, signal.SIGTERM)
 END_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
@@ -41,9 +42,7 @@ def start(workflow: Any, threads: int) -> None:
         return
     folder = tempfile.mkdtemp(prefix="viewbench-", dir=None if len(tempfile.gettempdir()) < LONGEST else "/tmp")
     address = str(Path(folder) / "jobs")
-    # -P: files in the folder of the results are no modules.
-    command = [sys.executable, "-P", "-m", __name__, address]
-    server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+    server = subprocess.Popen(command(address), stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
     os.environ[ADDRESS] = address
 
     def stop() -> None:
@@ -51,6 +50,11 @@ def start(workflow: Any, threads: int) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
     atexit.register(stop)
+
+
+def command(address: str) -> list[str]:
+    """What starts a server. -P: files in the folder that it is started in, that of the results, are no modules."""
+    return [sys.executable, "-P", "-m", "viewbench.workflow._fork_server", address]
 
 
 def _watches() -> bool:
@@ -93,9 +97,12 @@ class Server:
             start, fds, _, _ = socket.recv_fds(connection, LENGTH, 3)
             content = connection.makefile("rb").read(int.from_bytes(start, "big"))
             request = json.loads(content)
+            # What reaches the child before it minds signals waits until it does.
+            signal.pthread_sigmask(signal.SIG_BLOCK, PASSED_ON)
             pid = os.fork()
             if not pid:
                 run(request, fds)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, PASSED_ON)
         except (OSError, ValueError):  # it went away
             connection.close()
             return
@@ -137,6 +144,7 @@ def run(request: dict[str, Any], fds: list[int]) -> NoReturn:
         ctypes.CDLL(None).prctl(END_WITH_PARENT, signal.SIGTERM)
         for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
             signal.signal(number, signal.SIG_IGN if number in request["ignored"] else usual)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, PASSED_ON)
         for number, fd in enumerate(fds):
             os.dup2(fd, number)
         os.closerange(3, max(fds, default=3) + 100)
@@ -191,4 +199,6 @@ if __name__ == "__main__":
     server = Server(sys.argv[1])
     prepare()
     server.serve()
-    shutil.rmtree(Path(sys.argv[1]).parent, ignore_errors=True)  # here too, since the run may have been killed
+    with contextlib.suppress(OSError):  # here too, since the run may have been killed
+        Path(sys.argv[1]).unlink()
+        Path(sys.argv[1]).parent.rmdir()

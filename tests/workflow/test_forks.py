@@ -55,8 +55,9 @@ def package(tmp_path_factory) -> Path:
 @pytest.fixture
 def server(package, tmp_path) -> Iterator[subprocess.Popen]:
     address = tmp_path / "jobs"
-    command = [sys.executable, "-m", "viewbench.workflow._fork_server", str(address)]
-    started = subprocess.Popen(command, stdin=subprocess.PIPE, env=environment_of(package), cwd=tmp_path)
+    started = subprocess.Popen(
+        _fork_server.command(str(address)), stdin=subprocess.PIPE, env=environment_of(package), cwd=tmp_path
+    )
     until(address.exists)
     yield started
     started.communicate(timeout=60)
@@ -66,11 +67,11 @@ def server(package, tmp_path) -> Iterator[subprocess.Popen]:
 def begin(package, tmp_path) -> Callable[..., subprocess.Popen]:
     """Starts `viewbench probe WHAT`, which finds the server where there is one."""
 
-    def popen(*arguments: str, **variables: str) -> subprocess.Popen:
+    def popen(*arguments: str, before: Callable[[], object] | None = None, **variables: str) -> subprocess.Popen:
         command = [sys.executable, "-m", "viewbench", *arguments]
         environment = {**environment_of(package), _fork_client.ADDRESS: str(tmp_path / "jobs"), **variables}
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        return subprocess.Popen(command, cwd=tmp_path, env=environment, **pipes)
+        return subprocess.Popen(command, cwd=tmp_path, env=environment, preexec_fn=before, **pipes)
 
     return popen
 
@@ -99,6 +100,45 @@ def waiting(begin, tmp_path) -> tuple[subprocess.Popen, int]:
     pid = int((tmp_path / "pid").read_text())
     assert pid != client.pid
     return client, pid
+
+
+def test_files_beside_the_results_are_no_modules(package, begin, tmp_path):
+    for name in ("plyfile", "click", "queue"):
+        (tmp_path / f"{name}.py").write_text("raise ImportError('this is not it')", encoding="utf-8")
+    command, environment = _fork_server.command(str(tmp_path / "jobs")), environment_of(package)
+    started = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, cwd=tmp_path)
+    until((tmp_path / "jobs").exists)
+    # The server's folder is no place to look for its modules; `python -m viewbench` of a test would look there itself.
+    client = begin("probe", "report", ".", PYTHONSAFEPATH="1")
+    assert client.communicate(timeout=60)[1] == "beside it\n"
+    assert client.returncode == 0
+    _, errors = started.communicate(timeout=60)
+    assert (started.returncode, errors) == (0, b"")
+    assert not (tmp_path / "jobs").exists()
+
+
+def test_who_is_gone_before_an_answer_leaves_no_job(server, begin, tmp_path):
+    client = begin("probe", "wait", str(tmp_path))
+    time.sleep(0.2)  # while the server imports
+    client.kill()
+    client.communicate(timeout=60)
+    begin("probe", "report", ".").communicate(timeout=60)  # which comes after it
+    if (tmp_path / "pid").is_file():
+        until(lambda: ended(int((tmp_path / "pid").read_text() or 0)))
+
+
+def test_a_signal_that_was_ignored_still_is(server, begin, tmp_path):
+    client = begin("probe", "wait", str(tmp_path), before=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
+    until(lambda: (tmp_path / "pid").is_file() and (tmp_path / "pid").read_text().endswith("\n"))
+    pid = int((tmp_path / "pid").read_text())
+    for target in (client.pid, pid):
+        os.kill(target, signal.SIGINT)
+    time.sleep(0.5)
+    assert not (tmp_path / "stopped").exists()
+    assert not ended(pid)
+    client.terminate()
+    client.communicate(timeout=60)
+    until(lambda: ended(pid))
 
 
 def test_a_job_has_the_folder_the_variables_and_the_streams_of_who_asked(server, begin, tmp_path):
