@@ -15,11 +15,16 @@ from llvmlite import ir
 
 from .kernels import numba, written
 
-intrinsic: Any = numba.extending.intrinsic  # the function that it makes takes no typing context
 types, templates = numba.core.types, numba.core.typing.templates
 register_model = numba.extending.register_model
 lower_builtin, lower_cast = numba.extending.lower_builtin, numba.extending.lower_cast
 models = numba.extending.models
+
+
+def intrinsic(*function: Any, **options: Any) -> Any:
+    """numba's decorator. What it makes takes no typing context, which a type checker cannot know."""
+    return numba.extending.intrinsic(*function, **options)
+
 
 COUNT = 16
 _FLOAT, _INT = ir.FloatType(), ir.IntType(32)
