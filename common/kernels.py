@@ -8,7 +8,6 @@ import contextlib
 import hashlib
 import os
 from pathlib import Path
-from typing import Any
 
 from .files import user_cache
 from .settings import PACKAGE
@@ -17,6 +16,7 @@ from .settings import PACKAGE
 SOURCES = (
     "common/kernels.py",
     "common/lanes.py",
+    "common/lane_functions.py",
     "backends/_points/*.py",
     "backends/splat/*.py",
     "selectors/_coverage_kernels.py",
@@ -63,15 +63,6 @@ import numba.extending  # noqa: E402
 # In a process that was forked (workflow/_fork_server.py) numba was there before its settings.
 numba.core.config.reload_config()
 
-# Sums may be reordered and divisions turned into multiplications: the same bits on one machine, not on every one.
-FAST: Any = {
-    "fastmath": {"nsz", "arcp", "contract", "afn", "reassoc"},
-    "error_model": "numpy",
-    "boundscheck": False,
-    "nogil": True,
-}
-compiled = numba.njit(cache=True, **FAST)
-inlined = numba.njit(inline="always", **FAST)
 strict = numba.njit(cache=True)  # arithmetic as Python has it, in the order in which it is written
 # In the order in which it is written too, so the same bits on every machine, but a division by zero gives infinity, and
 # other threads are not kept waiting: loops without sums run as vectors.

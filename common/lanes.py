@@ -10,7 +10,6 @@ wider than it is done in parts. Values of type LANES live in kernels alone and c
 import operator
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 
 from .kernels import numba, written
@@ -72,19 +71,18 @@ def _cast(context, builder, fromty, toty, value):
     return _spread(builder, context.cast(builder, value, fromty, types.float32))
 
 
-def _operator(function, result, build, operands=2):
+def _operator(function, kind, result, build, operands=2):
     """Gives a Python operator a meaning for lanes, or for masks."""
+    scalars = (types.Float, types.Integer) if kind == LANES else ()
 
     @templates.infer_global(function)
     class _Typing(templates.AbstractTemplate):
         def generic(self, args, kws):
-            kind = MASK if build in (ir.IRBuilder.and_, ir.IRBuilder.or_) else LANES
-            scalars = () if kind == MASK else (types.Float, types.Integer)
             if len(args) == operands and kind in args and all(a == kind or isinstance(a, scalars) for a in args):
                 return templates.signature(result, *[kind] * operands)
             return None
 
-    @lower_builtin(function, *[MASK if build in (ir.IRBuilder.and_, ir.IRBuilder.or_) else LANES] * operands)
+    @lower_builtin(function, *[kind] * operands)
     def _lowered(context, builder, sig, args):
         return build(builder, *args)
 
@@ -95,12 +93,12 @@ for _function, _build in (
     (operator.mul, ir.IRBuilder.fmul),
     (operator.truediv, ir.IRBuilder.fdiv),
 ):
-    _operator(_function, LANES, _build)
-_operator(operator.neg, LANES, ir.IRBuilder.fneg, operands=1)
+    _operator(_function, LANES, LANES, _build)
+_operator(operator.neg, LANES, LANES, ir.IRBuilder.fneg, operands=1)
 for _function, _sign in ((operator.lt, "<"), (operator.gt, ">"), (operator.le, "<="), (operator.ge, ">=")):
-    _operator(_function, MASK, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
-_operator(operator.and_, MASK, ir.IRBuilder.and_)
-_operator(operator.or_, MASK, ir.IRBuilder.or_)
+    _operator(_function, LANES, MASK, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b))
+_operator(operator.and_, MASK, MASK, ir.IRBuilder.and_)
+_operator(operator.or_, MASK, MASK, ir.IRBuilder.or_)
 
 
 def _call(builder, name, result, args):
@@ -125,6 +123,25 @@ def _as_vector(builder, address):
     return builder.bitcast(address, _VECTOR.as_pointer())
 
 
+def _reads(*indices):
+    """Loads 16 elements of an array, the first argument, from the place on that these arguments name."""
+
+    def build(context, builder, sig, args):
+        return builder.load(_as_vector(builder, _place(context, builder, sig, args, 0, indices)), align=4)
+
+    return build
+
+
+def _writes(*indices, value):
+    """Stores 16 elements, argument `value`, likewise."""
+
+    def build(context, builder, sig, args):
+        builder.store(args[value], _as_vector(builder, _place(context, builder, sig, args, 0, indices)), align=4)
+        return context.get_dummy_value()
+
+    return build
+
+
 @intrinsic
 def spread(typingctx, scalar):
     """The scalar in every lane."""
@@ -134,21 +151,13 @@ def spread(typingctx, scalar):
 @intrinsic
 def load(typingctx, array, i):
     """16 elements of a one-dimensional array, from i on."""
-
-    def build(context, builder, sig, args):
-        return builder.load(_as_vector(builder, _place(context, builder, sig, args, 0, (1,))), align=4)
-
-    return LANES(array, i), build
+    return LANES(array, i), _reads(1)
 
 
 @intrinsic
 def load_row(typingctx, array, row, column):
     """16 elements of a row of a two-dimensional array, from `column` on."""
-
-    def build(context, builder, sig, args):
-        return builder.load(_as_vector(builder, _place(context, builder, sig, args, 0, (1, 2))), align=4)
-
-    return LANES(array, row, column), build
+    return LANES(array, row, column), _reads(1, 2)
 
 
 def _quarters(context, builder, sig, args):
@@ -203,12 +212,7 @@ def load_some(typingctx, array, row, column, mask):
 @intrinsic
 def store(typingctx, array, i, value):
     """Writes 16 elements of a one-dimensional array."""
-
-    def build(context, builder, sig, args):
-        builder.store(args[2], _as_vector(builder, _place(context, builder, sig, args, 0, (1,))), align=4)
-        return context.get_dummy_value()
-
-    return types.void(array, i, LANES), build
+    return types.void(array, i, LANES), _writes(1, value=2)
 
 
 @intrinsic
@@ -226,12 +230,7 @@ def store_whole(typingctx, array, i, value):
 @intrinsic
 def store_row(typingctx, array, row, column, value):
     """Writes 16 elements of a row of a two-dimensional array."""
-
-    def build(context, builder, sig, args):
-        builder.store(args[3], _as_vector(builder, _place(context, builder, sig, args, 0, (1, 2))), align=4)
-        return context.get_dummy_value()
-
-    return types.void(array, row, column, LANES), build
+    return types.void(array, row, column, LANES), _writes(1, 2, value=3)
 
 
 @intrinsic
@@ -410,71 +409,3 @@ def _folded(builder, a, b, width):
 def aligned(array):
     """The first place of a float32 array at which a vector lies in one cache line; `array` has 16 elements to spare."""
     return (-(array.ctypes.data >> 2)) & (COUNT - 1)
-
-
-# 2^f on [-½, ½], the minimax polynomial: relative error 1e-7 and what rounding adds.
-_P0, _P1, _P2, _P3, _P4, _P5 = (
-    np.float32(c) for c in (1.0, 0.69314698, 0.24022242, 0.055507337, 0.0096715126, 0.0013264727)
-)
-_S1, _S2, _S3, _S4 = (np.float32(c) for c in (0.69312419, 0.2402411, 0.055906425, 0.0095828531))
-_MAGIC = np.float32(1.5 * 2**23)
-_ROOT2 = np.float32(2**0.5)
-_L1, _L3, _L5, _L7, _L9 = (np.float32(2 / np.log(2) / k) for k in (1, 3, 5, 7, 9))
-_LOG2E = np.float32(1.4426950408889634)
-
-
-@written
-def exp2(x):
-    """2^x for x in [-126, 126]."""
-    magic = x + _MAGIC
-    f = x - (magic - _MAGIC)
-    p = fma(f, spread(_P5), spread(_P4))
-    p = fma(f, p, spread(_P3))
-    p = fma(f, p, spread(_P2))
-    p = fma(f, p, spread(_P1))
-    return times_power(fma(f, p, spread(_P0)), magic)
-
-
-@written
-def exp2_short(x):
-    """2^x for x in [-126, 126], to 3e-6 of it."""
-    magic = x + _MAGIC
-    f = x - (magic - _MAGIC)
-    p = fma(f, spread(_S4), spread(_S3))
-    p = fma(f, p, spread(_S2))
-    p = fma(f, p, spread(_S1))
-    return times_power(fma(f, p, spread(_P0)), magic)
-
-
-@written
-def exp(x):
-    """e^x for x in [-22, 22], and clamped to it: 3e-10 to 4e9, which can be squared."""
-    return exp2(smaller(larger(x * _LOG2E, spread(np.float32(-32))), spread(np.float32(32))))
-
-
-@written
-def log2(x):
-    """log2 of positive normal numbers, by the series of the inverse hyperbolic tangent; error below 2e-7 · |log2 x|."""
-    m = mantissa(x)
-    high = m > _ROOT2
-    m = where(high, m * np.float32(0.5), m)
-    e = exponent(x) + where(high, spread(np.float32(1)), spread(np.float32(0)))
-    s = (m - np.float32(1)) / (m + np.float32(1))
-    z = s * s
-    p = fma(z, spread(_L9), spread(_L7))
-    p = fma(z, p, spread(_L5))
-    p = fma(z, p, spread(_L3))
-    p = fma(z, p, spread(_L1))
-    return fma(s, p, e)
-
-
-@written
-def dot(a0, b0, a1, b1, a2, b2):
-    """a₀ b₀ + a₁ b₁ + a₂ b₂."""
-    return fma(a0, b0, fma(a1, b1, a2 * b2))
-
-
-@written
-def sigmoid(x):
-    """1 / (1 + e^-x)."""
-    return np.float32(1) / (np.float32(1) + exp(-x))

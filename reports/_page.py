@@ -14,7 +14,7 @@ from ..common.files import read_json, write_text
 from ..common.provenance import machine
 from . import _findings, _items, _study
 from ._items import Item
-from ._study import OK, Study, and_list, in_order, percent, selector_words
+from ._study import OK, Study, and_list, counted, in_order, percent, selector_words
 
 TEMPLATES = Path(__file__).parent / "templates"
 HEAVY_BYTES = 300_000  # a larger PNG goes into the page as WebP; the PNG itself stays beside the page
@@ -103,10 +103,7 @@ def _facts(study: Study) -> list[tuple[str, str]]:
     """What was run, where and when, as (what, value) pairs; what no file says is left out."""
     trains = [cell.read("train") for cell in study.done]
     here = machine()
-    devices = in_order(
-        f"{train['device']}, {train['threads']} thread{'s' if train['threads'] != 1 else ''} per job"
-        for train in trains
-    )
+    devices = in_order(f"{train['device']}, {counted(train['threads'], 'thread')} per job" for train in trains)
     facts = [
         ("Scenes", and_list(_scene_words(study, scene) for scene in study.scenes)),
         ("Selectors", and_list(map(selector_words, study.record["selectors"]))),
@@ -153,7 +150,7 @@ def _grid_words(study: Study) -> str:
         "seed": len(study.seeds),
         "backend": len(study.backends),
     }
-    words = {what: f"{count} {what}{'s' if count != 1 else ''}" for what, count in counts.items()}
+    words = {what: counted(count, what) for what, count in counts.items()}
     seeds: dict[tuple[str, str], set[int]] = {}
     for cell in study.cells:
         seeds.setdefault((cell.backend, cell.selector), set()).add(cell.seed)
@@ -165,8 +162,7 @@ def _grid_words(study: Study) -> str:
 
 def _seed_words(study: Study, reference: bool | list[int]) -> str:
     """ "3 seeds": of the reference, which may have fewer than the study."""
-    count = len(study.seeds) if reference is True else len(reference or [])
-    return f"{count} seed{'s' if count != 1 else ''}"
+    return counted(len(study.seeds) if reference is True else len(reference or []), "seed")
 
 
 def _scene_words(study: Study, scene: str) -> str:

@@ -219,13 +219,18 @@ def and_list(words: Iterable[str]) -> str:
     return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)
 
 
+def counted(count: int, what: str) -> str:
+    """ "1 seed", "3 seeds"."""
+    return f"{count} {what}{'s' if count != 1 else ''}"
+
+
 def selector_words(entry: dict[str, Any]) -> str:
     """A selector of study.json for people: "maxmin", "logdet-sample (logdet, sample=True)", "coverage (3 seeds)"."""
     parts = [] if entry["selector"] == entry["name"] else [entry["selector"]]
     for key, value in (entry.get("parameters") or {}).items():
         parts.append(f"{key}={'+'.join(map(str, value)) if isinstance(value, list) else value}")
     if entry.get("seeds"):
-        parts.append(f"{len(entry['seeds'])} seed{'s' if len(entry['seeds']) != 1 else ''}")
+        parts.append(counted(len(entry["seeds"]), "seed"))
     return f"{entry['name']} ({', '.join(parts)})" if parts else entry["name"]
 
 

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 ADDRESS = "VIEWBENCH_FORK_SERVER"  # path of the server's socket, for the jobs of a study
+PASSED_ON = (signal.SIGINT, signal.SIGTERM)  # to the job, but those that are ignored here
 LENGTH = 4  # bytes before a request, which say how long it is
 
 
@@ -20,8 +21,7 @@ def run(arguments: list[str]) -> int | None:
     import json
     import socket
 
-    passed = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) != signal.SIG_IGN]
-    ignored = [int(number) for number in (signal.SIGINT, signal.SIGTERM) if number not in passed]
+    ignored = [int(number) for number in PASSED_ON if signal.getsignal(number) == signal.SIG_IGN]
     request = {
         "arguments": arguments,
         "folder": str(Path.cwd()),
@@ -36,8 +36,7 @@ def run(arguments: list[str]) -> int | None:
         with contextlib.suppress(ProcessLookupError):  # it has just ended
             os.killpg(int(pid), number)
 
-    for number in passed:
-        signal.signal(number, pass_on)
+    before = {number: signal.signal(number, pass_on) for number in PASSED_ON if number not in ignored}
     content = json.dumps(request).encode()  # names that are not UTF-8 are escaped
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         try:
@@ -49,8 +48,8 @@ def run(arguments: list[str]) -> int | None:
         except OSError:
             pid = ""
         if not pid:
-            for number in passed:
-                signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+            for number, handler in before.items():
+                signal.signal(number, handler)
             return None
         status = lines.readline()
     if not status:

@@ -27,12 +27,11 @@ import traceback
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ._fork_client import ADDRESS, LENGTH
+from ._fork_client import ADDRESS, LENGTH, PASSED_ON
 
 PACKAGES = ("click", "numpy", "PIL.Image", "plyfile", "scipy.ndimage", "scipy.spatial", "skimage.metrics")
 LONGEST = 80  # bytes of a folder's name that leave room for that of a socket in it
 PATIENCE_S = 10.0  # for the rest of a request that has begun
-PASSED_ON = (signal.SIGINT, signal.SIGTERM)
 END_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 

@@ -1,7 +1,7 @@
 """Study files: a grid scenes × selectors × ratios × seeds × backends, checked before anything runs."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -191,16 +191,11 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
         _checked(path, all_options, backend.backend, trainer.CAPABILITIES.options, backend.options)
         if backend.iterations is None and backend.seconds is None:
             raise UserError(f"study '{path}': backend '{backend.name}' has no budget; give iterations or seconds")
-        _check_grid(backend, raw, [entry.name for entry in selectors], path)
+        _check_grid(backend, raw, selectors, path)
     for name, seeds in (*((entry.name, entry.seeds) for entry in selectors), ("reference", _reference(raw))):
         missing = [seed for seed in seeds if seed not in _seeds(raw["seeds"])]
         if missing:
             raise UserError(f"study '{path}': '{name}' has seed {missing[0]}, which the study does not have")
-    for backend in backends:
-        for entry in selectors:
-            runs = entry.name in backend.grid.get("selectors", [entry.name])
-            if runs and entry.seeds and not set(entry.seeds) & set(backend.grid.get("seeds", entry.seeds)):
-                raise UserError(f"study '{path}': backend '{backend.name}' has none of the seeds of '{entry.name}'")
     for name in SHARED:
         if name in raw and not any(name in backend.options for backend in backends):
             raise UserError(f"study '{path}': '{name}' is set, and none of its backends has it; leave it out")
@@ -277,9 +272,10 @@ def _seeds(given: int | list[int]) -> tuple[int, ...]:
     return tuple(int(seed) for seed in given) if isinstance(given, list) else tuple(range(int(given)))
 
 
-def _check_grid(backend: BackendEntry, raw: dict, selectors: list[str], path: Path) -> None:
-    """Raises UserError where a backend's part of the grid is none of the study's."""
-    whole = {"scenes": raw["scenes"], "selectors": selectors, "ratios": list(map(float, raw["ratios"]))}
+def _check_grid(backend: BackendEntry, raw: dict, selectors: Sequence[SelectorEntry], path: Path) -> None:
+    """Raises UserError where a backend's part of the grid is none of the study's, or leaves a selector no seed."""
+    names = [entry.name for entry in selectors]
+    whole = {"scenes": raw["scenes"], "selectors": names, "ratios": list(map(float, raw["ratios"]))}
     for axis, known in {**whole, "seeds": list(_seeds(raw["seeds"]))}.items():
         for value in backend.grid.get(axis, []):
             if value not in known:
@@ -287,6 +283,10 @@ def _check_grid(backend: BackendEntry, raw: dict, selectors: list[str], path: Pa
                     f"study '{path}': the grid of backend '{backend.name}' has {axis[:-1]} {value!r}, which the study "
                     f"does not have{nearest(str(value), map(str, known))}"
                 )
+    for entry in selectors:
+        runs = entry.name in backend.grid.get("selectors", names)
+        if runs and entry.seeds and not set(entry.seeds) & set(backend.grid.get("seeds", entry.seeds)):
+            raise UserError(f"study '{path}': backend '{backend.name}' has none of the seeds of '{entry.name}'")
 
 
 def _checked(path: Path, check: Callable, *arguments: Any) -> Any:

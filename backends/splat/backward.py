@@ -5,17 +5,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.kernels import exact
+from ...common.lane_functions import dot, exp, sigmoid
 from ...common.lanes import (
     aligned,
-    dot,
-    exp,
     fma,
     load,
     load_row,
     load_some,
     magnitude,
     numbers,
-    sigmoid,
     spread,
     sqrt,
     store,
@@ -37,6 +35,7 @@ from .projection import (
     covariance,
     jacobian_rows,
     on_screen,
+    scales,
     shape,
     to_camera,
     unit_quaternion,
@@ -111,11 +110,7 @@ def project_backward(g, view, slots, pair_gradient, out, first, last):
         ux, uy = tx * rz, ty * rz
         u, v = clamped(ux, limit_x), clamped(uy, limit_y)
         w, x, y, z, inverse_length = unit_quaternion(g, i, inside)
-        s0, s1, s2 = (
-            exp(load_some(g, LOG_SCALE, i, inside)),
-            exp(load_some(g, LOG_SCALE + 1, i, inside)),
-            exp(load_some(g, LOG_SCALE + 2, i, inside)),
-        )
+        s0, s1, s2 = scales(g, i, inside)
         m = shape(w, x, y, z, s0, s1, s2)
         t = jacobian_rows(cam, rz, u, v)
         us = on_screen(t, m)

@@ -119,13 +119,34 @@ def _next(slot, lines, stride):
     return 2 * RADIUS
 
 
+@written
+def _keep(lines, at, kind, before, here, behind):
+    """Goes along a row with three planes' windows, `kind` apart in `lines`; of each 16 pixels and those beside them."""
+    store(lines, at, _across(before[0], here[0], behind[0]))
+    store(lines, kind + at, _across(before[1], here[1], behind[1]))
+    store(lines, 2 * kind + at, _across(before[2], here[2], behind[2]))
+
+
+@written
+def _moments(x, y, at):
+    """What SSIM takes the window of, of 16 pixels: x, x² and xy."""
+    here = load(x, at)
+    return here, here * here, here * load(y, at)
+
+
+@written
+def _of_each(a, b, c, at):
+    """16 pixels of three planes."""
+    return load(a, at), load(b, at), load(c, at)
+
+
 @exact
 def compare(image, target, weight, workspace, first, last):
     """Fills the derivatives and sums of SSIM of rows `first` to `last` of the picture, image (3, size)."""
     stride = workspace.mask.shape[0]
     scale = -weight / F(3 * workspace.pixels)
-    lines, zero = np.empty(3 * LINES * stride, np.float32), spread(ZERO)
-    second, third = LINES * stride, 2 * LINES * stride
+    kind, zero = LINES * stride, spread(ZERO)
+    lines, nothing = np.empty(3 * kind, np.float32), (zero, zero, zero)
     for c in range(3):
         x, y, mean_y, var_y = image[c], target.image[c], target.mean[c], target.variance[c]
         by_mean, by_square, by_product = workspace.by.mean[c], workspace.by.square[c], workspace.by.product[c]
@@ -134,18 +155,11 @@ def compare(image, target, weight, workspace, first, last):
             slot = _next(slot, lines, stride)
             own, plane = slot * stride, line * stride
             slot += 1
-            x0, xx0, xy0 = zero, zero, zero
-            x1 = load(x, plane)
-            xx1, xy1 = x1 * x1, x1 * load(y, plane)
+            before, here = nothing, _moments(x, y, plane)
             for at in range(0, stride, 16):
-                x2, xx2, xy2 = zero, zero, zero
-                if at + 16 < stride:
-                    x2 = load(x, plane + at + 16)
-                    xx2, xy2 = x2 * x2, x2 * load(y, plane + at + 16)
-                store(lines, own + at, _across(x0, x1, x2))
-                store(lines, second + own + at, _across(xx0, xx1, xx2))
-                store(lines, third + own + at, _across(xy0, xy1, xy2))
-                x0, xx0, xy0, x1, xx1, xy1 = x1, xx1, xy1, x2, xx2, xy2
+                behind = _moments(x, y, plane + at + 16) if at + 16 < stride else nothing
+                _keep(lines, own + at, kind, before, here, behind)
+                before, here = here, behind
             row = line - 2 * RADIUS
             if row < first:
                 continue
@@ -153,8 +167,8 @@ def compare(image, target, weight, workspace, first, last):
             total = zero
             for at in range(0, stride, 16):
                 inside = load(workspace.mask, at)
-                m, square = _down(lines, own + at, stride), _down(lines, second + own + at, stride)
-                product = _down(lines, third + own + at, stride)
+                m, square = _down(lines, own + at, stride), _down(lines, kind + own + at, stride)
+                product = _down(lines, 2 * kind + own + at, stride)
                 my = load(mean_y, plane + at)
                 both_means = m * my
                 a1, a2 = fma(TWO, both_means, C1), fma(TWO, product - both_means, C2)
@@ -178,8 +192,8 @@ def descend(image, target, weight, workspace, gradient, first, last):
     """Fills rows `first` to `last` of the gradient (3, size) of the whole loss, and the sums of |x - y|."""
     stride = workspace.mask.shape[0]
     step = (ONE - weight) / F(3 * workspace.pixels)
-    lines, zero = np.empty(3 * LINES * stride, np.float32), spread(ZERO)
-    second, third = LINES * stride, 2 * LINES * stride
+    kind, zero = LINES * stride, spread(ZERO)
+    lines, nothing = np.empty(3 * kind, np.float32), (zero, zero, zero)
     for c in range(3):
         x, y, out = image[c], target.image[c], gradient[c]
         by_mean, by_square, by_product = workspace.by.mean[c], workspace.by.square[c], workspace.by.product[c]
@@ -188,29 +202,24 @@ def descend(image, target, weight, workspace, gradient, first, last):
             slot = _next(slot, lines, stride)
             own, plane = slot * stride, line * stride
             slot += 1
-            m0, e0, f0 = zero, zero, zero
-            m1, e1, f1 = load(by_mean, plane), load(by_square, plane), load(by_product, plane)
+            before, here = nothing, _of_each(by_mean, by_square, by_product, plane)
             for at in range(0, stride, 16):
-                m2, e2, f2 = zero, zero, zero
-                if at + 16 < stride:
-                    then = plane + at + 16
-                    m2, e2, f2 = load(by_mean, then), load(by_square, then), load(by_product, then)
-                store(lines, own + at, _across(m0, m1, m2))
-                store(lines, second + own + at, _across(e0, e1, e2))
-                store(lines, third + own + at, _across(f0, f1, f2))
-                m0, e0, f0, m1, e1, f1 = m1, e1, f1, m2, e2, f2
+                then = plane + at + 16
+                behind = _of_each(by_mean, by_square, by_product, then) if at + 16 < stride else nothing
+                _keep(lines, own + at, kind, before, here, behind)
+                before, here = here, behind
             row = line - 2 * RADIUS
             if row < first:
                 continue
             own, plane = own - 2 * RADIUS * stride, (row + RADIUS) * stride
             total = zero
             for at in range(0, stride, 16):
-                here, there = load(x, plane + at), load(y, plane + at)
-                difference = here - there
+                drawn, there = load(x, plane + at), load(y, plane + at)
+                difference = drawn - there
                 total = total + magnitude(difference)
                 sign = where(difference > ZERO, spread(step), where(difference < ZERO, spread(-step), zero))
-                value = fma(here, _down(lines, second + own + at, stride), _down(lines, own + at, stride))
-                value = fma(there, _down(lines, third + own + at, stride), value)
+                value = fma(drawn, _down(lines, kind + own + at, stride), _down(lines, own + at, stride))
+                value = fma(there, _down(lines, 2 * kind + own + at, stride), value)
                 store(out, plane + at, (value + sign) * load(workspace.mask, at))
             store(workspace.absolute[c, row], 0, total)
 

@@ -18,19 +18,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.kernels import exact, written
+from ...common.lane_functions import dot, exp, log2, sigmoid
 from ...common.lanes import (
     aligned,
     bits,
-    dot,
-    exp,
     floor,
     fma,
     larger,
     load_some,
-    log2,
     lowest,
     numbers,
-    sigmoid,
     smaller,
     spread,
     sqrt,
@@ -119,6 +116,13 @@ def unit_quaternion(g, i, which):
 
 
 @written
+def scales(g, i, which):
+    """Standard deviations along the Gaussian's axes."""
+    first, second = exp(load_some(g, LOG_SCALE, i, which)), exp(load_some(g, LOG_SCALE + 1, i, which))
+    return first, second, exp(load_some(g, LOG_SCALE + 2, i, which))
+
+
+@written
 def shape(w, x, y, z, s0, s1, s2):
     """M = R(q) diag(s), row by row."""
     return (
@@ -188,6 +192,13 @@ def view_direction(g, cam, i, which):
     return dx * inverse, dy * inverse, dz * inverse
 
 
+@written
+def tiles_within(middle, radius, count):
+    """How many of `count` tiles in a row, at most, are nearer to `middle` than `radius`."""
+    end = smaller(floor((middle + radius) * F(1 / TILE)) + ONE, count)
+    return end - larger(floor((middle - radius - ONE) * F(1 / TILE)), spread(ZERO))
+
+
 @exact
 def project(g, view, splats, part, first, last):
     """Fills the splats of range `part`, Gaussians `first` (a multiple of 16) to `last` of g (rows, N)."""
@@ -208,11 +219,7 @@ def project(g, view, splats, part, first, last):
         rz = ONE / tz
         ux, uy = tx * rz, ty * rz
         w, x, y, z, _ = unit_quaternion(g, i, inside)
-        s0, s1, s2 = (
-            exp(load_some(g, LOG_SCALE, i, inside)),
-            exp(load_some(g, LOG_SCALE + 1, i, inside)),
-            exp(load_some(g, LOG_SCALE + 2, i, inside)),
-        )
+        s0, s1, s2 = scales(g, i, inside)
         t = jacobian_rows(cam, rz, clamped(ux, limit_x), clamped(uy, limit_y))
         a, b, c, sharp = covariance(on_screen(t, shape(w, x, y, z, s0, s1, s2)))
         determinant = fma(low_pass, a + c + low_pass, sharp)
@@ -230,13 +237,7 @@ def project(g, view, splats, part, first, last):
         left = bits(seen)
         if left == 0:
             continue
-        columns = smaller(floor((px + rx) * F(1 / TILE)) + ONE, across) - larger(
-            floor((px - rx - ONE) * F(1 / TILE)), spread(ZERO)
-        )
-        rows = smaller(floor((py + ry) * F(1 / TILE)) + ONE, down) - larger(
-            floor((py - ry - ONE) * F(1 / TILE)), spread(ZERO)
-        )
-        store(memory, most, columns * rows)
+        store(memory, most, tiles_within(px, rx, across) * tiles_within(py, ry, down))
         store(memory, depth, tz)
         dx, dy, dz = view_direction(g, cam, i, inside)
         fill_basis(degree, dx, dy, dz, basis)

@@ -10,11 +10,10 @@ from the forward pass, so the part of it that lies behind splat i is found by su
 import numpy as np
 
 from ...common.kernels import exact, written
+from ...common.lane_functions import dot, exp2_short
 from ...common.lanes import (
     aligned,
     bits,
-    dot,
-    exp2_short,
     fma,
     load,
     load_square,
@@ -55,6 +54,14 @@ def _places():
 
 
 @written
+def _pair(drawn, slots, slot, left, upper):
+    """Which quarters of a tile at (left, upper) a splat touches, its mean from there, conic, opacity and colour."""
+    i, quarters = slots.splat[slot] >> 4, np.int64(slots.splat[slot] & 15)
+    x, y, a, b, c = left - drawn[i, X], upper - drawn[i, Y], drawn[i, A], drawn[i, B], drawn[i, C]
+    return quarters, x, y, a, b, c, drawn[i, LOG2_OPACITY], drawn[i, RED], drawn[i, GREEN], drawn[i, BLUE]
+
+
+@written
 def _alpha(x, y, a, b, c, opacity):
     """Alpha of 16 pixels at (x, y) from the mean, and its log2 before it is cut."""
     across = fma(a, x, b * y)
@@ -92,12 +99,8 @@ def render(drawn, slots, tiles, background, image, stride, first, last):
         begin, end = starts[tile], starts[tile + 1]
         k = begin
         while k < end:
-            slot = lists[k]
-            i, quarters = slots.splat[slot] >> 4, np.int64(slots.splat[slot] & 15)
+            quarters, x, y, a, b, c, opacity, red, green, blue = _pair(drawn, slots, lists[k], left, upper)
             k += 1
-            x, y, a, b, c = left - drawn[i, X], upper - drawn[i, Y], drawn[i, A], drawn[i, B], drawn[i, C]
-            opacity = drawn[i, LOG2_OPACITY]
-            red, green, blue = drawn[i, RED], drawn[i, GREEN], drawn[i, BLUE]
             while quarters:
                 q = lowest(quarters)
                 quarters &= quarters - 1
@@ -155,10 +158,7 @@ def render_backward(drawn, slots, tiles, image, image_gradient, stride, pair_gra
             store(memory, BEHIND + p, dot(r, red, g, green, b_, load_square(image[2], at, stride)))
         for k in range(starts[tile], stops[tile]):
             slot = lists[k]
-            i, quarters = slots.splat[slot] >> 4, np.int64(slots.splat[slot] & 15)
-            x, y, a, b, c = left - drawn[i, X], upper - drawn[i, Y], drawn[i, A], drawn[i, B], drawn[i, C]
-            opacity = drawn[i, LOG2_OPACITY]
-            red, green, blue = drawn[i, RED], drawn[i, GREEN], drawn[i, BLUE]
+            quarters, x, y, a, b, c, opacity, red, green, blue = _pair(drawn, slots, slot, left, upper)
             s_0 = s_x = s_y = s_xx = s_xy = s_yy = w_r = w_g = w_b = spread(ZERO)
             while quarters:
                 q = lowest(quarters)

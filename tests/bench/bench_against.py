@@ -22,7 +22,6 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parents[2]
 CASES = "room_human:128:80,room_human:256:80,hololens_space:180:65"
-HOLDOUTS = {"hololens_space": "blocks:8", "real_room": "every:8", "diorama_room": "every:8"}
 THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
@@ -38,19 +37,16 @@ def command(checkout: Path, *arguments: str) -> str:
 def run(checkout: Path, case: tuple[str, int, int], budget: list[str], seed: int, score: bool) -> dict[str, float]:
     """Milliseconds of a step, early and late, seconds of the command, and test PSNR in dB, of one training."""
     scene, width, count = case
-    holdout = ["--holdout", HOLDOUTS[scene]] if scene in HOLDOUTS else []
     with tempfile.TemporaryDirectory() as folder:
         chosen, model = f"{folder}/selection.json", f"{folder}/model"
-        command(
-            checkout, "select", scene, "--selector", "uniform", "--count", str(count), "--selection", chosen, *holdout
-        )
+        command(checkout, "select", scene, "--selector", "uniform", "--count", str(count), "--selection", chosen)
         began = time.perf_counter()
         asked = ["--selection", chosen, "--out", model, "--width", str(width), "--seed", str(seed)]
-        command(checkout, "train", scene, *asked, *budget, *holdout)
+        command(checkout, "train", scene, *asked, *budget)
         whole = time.perf_counter() - began
         record = json.loads(Path(model, "train.json").read_text())
         if score:
-            command(checkout, "evaluate", model, scene, "--out", model, *holdout)
+            command(checkout, "evaluate", model, scene, "--out", model)
         psnr = json.loads(Path(model, "metrics.json").read_text())["psnr_db"] if score else np.nan
     curve = record["curve"]
     last, before = curve[-1], curve[-3]

@@ -18,7 +18,7 @@ MODULES = {
     for folder in CODE
     for path in sorted((PACKAGE / folder).rglob("*.py"))
 }
-DECORATORS = {"compiled", "inlined", "strict", "exact", "written"}
+DECORATORS = {"strict", "exact", "written"}
 
 
 def python(code, **variables):
