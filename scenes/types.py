@@ -83,6 +83,8 @@ class Split:
     cameras: Cameras
     times: np.ndarray | None = None  # (N,) float64 seconds, where the format has them
     lens: str = ""  # camera model that is neither a pinhole nor OpenCV's: fit for selection, not for training
+    depths: tuple[Path | None, ...] = ()  # depth images, one a frame (None where it has none); empty where none has
+    masks: tuple[Path | None, ...] = ()  # masks, black where a pixel is not to be used; likewise
 
     def __len__(self) -> int:
         return len(self.names)
@@ -96,6 +98,8 @@ class Split:
             self.cameras[chosen],
             None if self.times is None else self.times[chosen],
             self.lens,
+            tuple(self.depths[i] for i in chosen) if self.depths else (),
+            tuple(self.masks[i] for i in chosen) if self.masks else (),
         )
 
 
@@ -125,4 +129,5 @@ class Scene:
     files: tuple[Path, ...] = ()  # what was read besides the images
     notes: tuple[str, ...] = ()  # what the reader dropped or assumed, for people
     posed: bool = True  # False for a folder of images or a video: poses are then the identity and mean nothing
+    depth_unit: float = 0.0  # scene units that 1 in a depth image stands for; 0 where there are none or it is not known
     details: dict[str, Any] = field(default_factory=dict)
