@@ -43,7 +43,7 @@ def evaluate(
         raise UserError(f"'{model / 'train.json'}' is not what training writes; train again")
     train = unsealed(train, f"'{model / 'train.json'}'")
     if not len(scene.test):
-        raise UserError(f"scene '{scene.name}' has no test views; make a test split with --holdout")
+        raise UserError(f"scene '{scene.name}' has no test views; select, train and evaluate with --holdout every:8")
     scene_hash = scene_sha256(scene)
     check_model(model, train, scene, scene_hash)
     backend = _registry.load(train["backend"], settings)

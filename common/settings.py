@@ -23,6 +23,8 @@ class SceneEntry:
     dataset: str = ""
     holdout: str = ""
     format: str = ""
+    allow_outside: bool = False
+    model: int = -1
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ SECTIONS: dict[str, type] = {
     "tracking": Tracking,
     "instant_ngp": InstantNgp,
 }
-MAY_BE_ZERO = ("renders", "timeout")  # no renders, no limit
+MAY_BE_ZERO = ("renders", "timeout", "model")  # no renders, no limit, the first model
 TABLES: dict[str, type] = {"scenes": SceneEntry, "command": Command}
 
 

@@ -1,7 +1,6 @@
 """Reads the pictures of a split at the size that training and scoring use."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from ..common.errors import UserError
 from .image_files import open_image
+from .lenses import pinholes, sampled, undistorting
 from .types import Cameras, Split
 
 
@@ -38,9 +38,9 @@ def load_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[n
 def read_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[Iterator[Picture], Cameras]:
     """The frames at `indices`, each read when its turn comes, and their pinhole cameras at that size.
 
-    `width` in pixels resizes by area average; None keeps the size. Lens distortion is taken out, alpha is laid on
-    white. Raises UserError for mixed sizes and a lens that is not OpenCV's, and as it reads for a missing or broken
-    file and a size that is not the camera's.
+    `width` in pixels resizes by area average; None keeps the size. Lens distortion is taken out (`lenses`: nothing is
+    seen past the border of the picture), alpha is laid on white. Raises UserError for mixed sizes and a lens that is
+    not OpenCV's, and as it reads for a missing or broken file and a size that is not the camera's.
     """
     if split.lens:
         raise UserError(f"cameras are {split.lens}, not pinholes; undistort the capture (colmap image_undistorter)")
@@ -50,7 +50,7 @@ def read_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[I
     sizes = set(zip(cameras.width.tolist(), cameras.height.tolist(), strict=True))
     if len(sizes) > 1:
         raise UserError(f"frames have different sizes, {sorted(sizes)}; resize the images of the capture to one")
-    return _read_all([split.paths[index] for index in indices], full, cameras), replace(cameras, distortion=None)
+    return _read_all([split.paths[index] for index in indices], full, cameras), pinholes(cameras)
 
 
 def _read_all(paths: list[Path], full: Cameras, cameras: Cameras) -> Iterator[Picture]:
@@ -62,8 +62,8 @@ def _read_all(paths: list[Path], full: Cameras, cameras: Cameras) -> Iterator[Pi
             # Most captures have one camera, and finding where its lens looks takes as long as the rest.
             same = b"".join(value.tobytes() for name, value in vars(camera).items() if name != "c2w")
             if same != lens:
-                lens, where = same, _distorted(camera)
-            picture = Picture(_sampled(picture.pixels(), where), 1)
+                lens, where = same, undistorting(camera)
+            picture = Picture(sampled(picture.pixels(), where), 1)
         yield picture
 
 
@@ -111,29 +111,3 @@ def _sums(rgb: np.ndarray, across: int, down: int) -> Picture:
         for k in range(1, across):
             sums[..., channel] += plane[:, k::across]
     return Picture(sums, one) if kind is np.uint16 else Picture((sums / one).astype(np.float32), 1)
-
-
-def _distorted(camera: Cameras) -> np.ndarray:
-    """(2, H, W) float64 row and column, from the first pixel's centre, where the camera sees a pinhole's pixels.
-
-    The pinhole has the same focal lengths and centre. OpenCV's model:
-    x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²), y' likewise.
-    """
-    assert camera.distortion is not None
-    k1, k2, p1, p2, k3 = camera.distortion[0]
-    fx, fy, cx, cy = camera.fx[0], camera.fy[0], camera.cx[0], camera.cy[0]
-    v, u = np.mgrid[: int(camera.height[0]), : int(camera.width[0])] + 0.5
-    x, y = (u - cx) / fx, (v - cy) / fy
-    r2 = x * x + y * y
-    radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
-    xd = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-    yd = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return np.stack([yd * fy + cy - 0.5, xd * fx + cx - 0.5])
-
-
-def _sampled(pixels: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(H, W, 3) float32, bilinearly."""
-    from scipy.ndimage import map_coordinates
-
-    channels = [map_coordinates(pixels[..., c], where, order=1, mode="nearest") for c in range(3)]
-    return np.stack(channels, axis=-1)

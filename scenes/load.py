@@ -3,6 +3,7 @@
 import dataclasses
 import os
 from pathlib import Path
+from typing import Any
 
 from ..common import plugins
 from ..common.errors import UserError, nearest
@@ -20,22 +21,49 @@ def open_scene(
     format: str | None = None,
     holdout: str | None = None,
     allow_outside: bool = False,
+    model: int | None = None,
 ) -> Scene:
     """The scene that `environment.toml` calls by this name, or the one in this folder.
 
     `format` forces a reader, `holdout` a test split ("every:8", "blocks:8", "none") where the format has none.
-    `allow_outside` lets transforms name images outside the folder.
-    Raises UserError for an unknown name, a folder in no known format, and whatever is wrong with its contents.
+    `allow_outside` lets transforms name images outside the folder, `model` is the number of a COLMAP model. What is not
+    given is taken from the entry of `environment.toml`.
+    Raises UserError for an unknown name, a folder in no known format, an option that the format does not have, and
+    whatever is wrong with its contents.
     """
     entry = settings.scenes.get(name_or_path)
     root = _folder(name_or_path, entry, settings)
     chosen = format or (entry.format if entry else "") or detect(root)
     reader = plugins.load(FORMATS, chosen)
-    scene = reader.read(root, allow_outside=True) if allow_outside and chosen == "transforms" else reader.read(root)
+    options: dict[str, Any] = {}
+    if chosen == "transforms":
+        options["allow_outside"] = allow_outside or (entry is not None and entry.allow_outside)
+    if model is not None:
+        if chosen != "colmap":
+            raise UserError(f"'{name_or_path}' is in format {chosen}, which has no models; leave --model out")
+        options["model_number"] = model
+    elif entry is not None and entry.model >= 0 and chosen == "colmap":
+        options["model_number"] = entry.model
+    scene = reader.read(root, **options)
     scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name)
-    scene = hold_out(scene, holdout or (entry.holdout if entry else "") or scene.details.get("holdout", "none"))
+    scene = _held_out(scene, holdout or "", entry.holdout if entry else "", settings)
     check_scene(scene)
     return scene
+
+
+def _held_out(scene: Scene, given: str, listed: str, settings: Settings) -> Scene:
+    """The scene with its test split: by the rule that was given, that of `environment.toml`, or the format's own habit.
+
+    Raises UserError where the capture has a test split already, which says who asked for another.
+    """
+    usual = scene.details.get("holdout", "")
+    rule = given or listed or usual or "none"
+    if rule != "none" and len(scene.test):
+        what = "leave --holdout out" if given else f"take `holdout` out of [scenes.{scene.name}] in {settings.source}"
+        raise UserError(f"scene '{scene.name}' has {len(scene.test)} test views of its own; {what}")
+    if not (given or listed) and usual:
+        scene = dataclasses.replace(scene, notes=(*scene.notes, scene.details["holdout_note"]))
+    return hold_out(scene, rule)
 
 
 def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:

@@ -1,6 +1,7 @@
 """Writes the chosen part of a scene as a scene of a format, with selection.json beside it."""
 
 import filecmp
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -13,21 +14,30 @@ from ..common.files import sealed, whole_folder, write_json
 from .image_files import check_whole, is_file
 from .types import Scene
 
+LINKS = ("absolute", "relative", "copy")  # how images come into a subset
 
-def write_subset(scene: Scene, selection: dict[str, Any], out: Path, copy: bool = False, force: bool = False) -> str:
-    """Writes the chosen training views and the whole test split to the folder `out`; returns the format written.
 
-    It is the one that was read or, where that is only read, transforms. Images are linked, or with `copy` copied. The
-    folder appears only when all of it is written. Raises UserError for an image that is missing or cut short, and for
-    a folder that exists and is not empty unless `force` replaces it.
+def write_subset(
+    scene: Scene,
+    selection: dict[str, Any],
+    out: Path,
+    links: str = "absolute",
+    force: bool = False,
+) -> tuple[str, list[str]]:
+    """Writes the chosen training views and the whole test split to the folder `out`; returns the format, and notes.
+
+    It is the format that was read or, where that is only read, transforms. The views are in capture order, so that
+    equal steps, windows of time and test splits mean the same in a subset; the order chosen is in selection.json.
+    Images are linked by their absolute paths (the subset can be moved), by relative ones (it can be moved together with
+    the capture), or copied. The folder appears only when all of it is written. Raises UserError for an image that is
+    missing or cut short, and for a folder that exists and is not empty unless `force` replaces it.
     """
     written = scene.format if writable(plugins.load("scenes.formats", scene.format)) else "transforms"
-    indices = np.asarray(selection["indices"], dtype=np.int64)
+    indices = np.sort(np.asarray(selection["indices"], dtype=np.int64))
     if scene.format != "video":
         for path in (*scene.train.subset(indices).paths, *scene.test.paths):
             check_whole(path)
-    write_scene(scene, indices, out, written, copy, force, selection)
-    return written
+    return written, write_scene(scene, indices, out, written, links, force, selection)
 
 
 def write_scene(
@@ -35,12 +45,14 @@ def write_scene(
     indices: np.ndarray,
     out: Path,
     format_name: str,
-    copy: bool = False,
+    links: str = "absolute",
     force: bool = False,
     selection: dict[str, Any] | None = None,
-) -> None:
-    """Writes the training views at `indices` and the test split in the format `format_name`; as `write_subset`."""
+) -> list[str]:
+    """Writes the training views at `indices`, in that order, and the test split in a format; as `write_subset`."""
     module = plugins.load("scenes.formats", format_name)
+    if links not in LINKS:
+        raise UserError(f"unknown kind of links '{links}' (there are: {', '.join(LINKS)})")
     if not writable(module):
         raise UserError(
             f"format '{format_name}' can be read and not written; write transforms or colmap (convert --to)"
@@ -54,14 +66,31 @@ def write_scene(
     lens = scene.train.lens or scene.test.lens
     if lens and format_name != scene.format:
         raise UserError(f"scene '{scene.name}' has {lens} cameras, which only its own format tells; undistort it first")
+    check_out(scene, out, force)
+    with whole_folder(out) as temporary:
+        notes = module.write(scene, indices, temporary, links == "copy") or []
+        if links == "relative":
+            _relate(temporary)
+        if selection is not None:
+            write_json(temporary / "selection.json", sealed({**selection, "holdout": scene.holdout}))
+    return list(notes)
+
+
+def check_out(scene: Scene, out: Path, force: bool) -> None:
+    """Raises UserError for a folder that is not empty, unless `force` replaces it, or that holds the capture."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())) and not force:
         raise UserError(f"'{out}' exists and is not empty; name another folder or give --force")
     if out.resolve() == scene.root.resolve() or scene.root.resolve().is_relative_to(out.resolve()):
         raise UserError(f"'{out}' holds the capture itself; name another folder")
-    with whole_folder(out) as temporary:
-        module.write(scene, indices, temporary, copy)
-        if selection is not None:
-            write_json(temporary / "selection.json", sealed({**selection, "holdout": scene.holdout}))
+
+
+def _relate(folder: Path) -> None:
+    """Makes absolute links relative. The folder is renamed where it lies, so that steps upwards stay right."""
+    for link in [path for path in folder.rglob("*") if path.is_symlink()]:
+        target = link.readlink()
+        if target.is_absolute():
+            link.unlink()
+            link.symlink_to(os.path.relpath(target, link.parent.resolve()))
 
 
 def writable(module: Any) -> bool:

@@ -62,6 +62,10 @@ class Cameras:
     def scaled(self, width: int) -> "Cameras":
         """The same cameras for images resized to `width` pixels, heights rounded to keep the aspect."""
         height = np.maximum(1, np.round(self.height * (width / self.width))).astype(np.int64)
+        return self.resized(np.full_like(self.width, width), height)
+
+    def resized(self, width: np.ndarray, height: np.ndarray) -> "Cameras":
+        """The same cameras for images resized to (N,) `width` x `height` pixels."""
         sx, sy = width / self.width, height / self.height
         return replace(
             self,
@@ -69,7 +73,7 @@ class Cameras:
             fy=self.fy * sy,
             cx=self.cx * sx,
             cy=self.cy * sy,
-            width=np.full_like(self.width, width),
+            width=width,
             height=height,
         )
 

@@ -10,9 +10,7 @@ RIGID = 1e-3  # largest deviation of RᵀR from the identity; poses are often wr
 
 
 def check_scene(scene: Scene) -> None:
-    """Raises UserError for no frames, duplicate names, mixed sizes, poses that are not rigid or finite, and bad
-    intrinsics.
-    """
+    """Raises UserError for no frames, duplicate names, poses that are not rigid or finite, and bad intrinsics."""
     if not len(scene.train):
         raise UserError(f"scene '{scene.name}' has no training views in '{scene.root}'")
     names = [*scene.train.names, *scene.test.names]
@@ -21,7 +19,6 @@ def check_scene(scene: Scene) -> None:
         raise UserError(f"scene '{scene.name}': frame '{twice}' is listed twice; frame names must be unique")
     for split in (scene.train, scene.test):
         _check_split(scene, split)
-    _check_sizes(scene)
     if scene.points is not None and not np.isfinite(scene.points.xyz).all():
         raise UserError(f"scene '{scene.name}': its points have NaN or infinite coordinates; clean the point file")
 
@@ -48,34 +45,30 @@ def _first(split: Split, bad: np.ndarray) -> str:
     return split.names[int(np.flatnonzero(bad)[0])]
 
 
-def _check_sizes(scene: Scene) -> None:
-    """Raises UserError when frames have different sizes: trainers and scores want one."""
-    for split in (scene.train, scene.test):
-        sizes = np.stack([split.cameras.width, split.cameras.height], axis=1)
-        first = np.array([scene.train.cameras.width[0], scene.train.cameras.height[0]])
-        bad = (sizes != first).any(axis=1)
-        if bad.any():
-            i = int(np.flatnonzero(bad)[0])
-            raise UserError(
-                f"scene '{scene.name}' mixes sizes: frame '{split.names[i]}' is {sizes[i][0]} x {sizes[i][1]}, "
-                f"'{scene.train.names[0]}' {first[0]} x {first[1]}; resize the images to one size"
-            )
-
-
 def check_present(scene: Scene) -> None:
-    """Raises UserError for the first image of either split that is missing, is no image or is not as big as the first.
+    """Raises UserError for the first image of either split that is missing, is none, or is not of its camera's size.
 
-    Only the heads of the files are read.
+    Only the heads of the files are read. Of an image that was resized without its intrinsics every ray would be wrong,
+    and nobody would be told.
     """
-    first = None
+    made_small = bool(scene.details.get("extracted"))  # a video's pictures; its cameras have the video's own size
     for split in (scene.train, scene.test):
-        for name, path in zip(split.names, split.paths, strict=True):
+        sizes = zip(split.cameras.width.tolist(), split.cameras.height.tolist(), strict=True)
+        for name, path, size in zip(split.names, split.paths, sizes, strict=True):
             if not is_file(path):
                 raise UserError(f"scene '{scene.name}': the image of frame '{name}' is missing: '{path}'")
-            size = image_size(path)
-            first = first or size
-            if size != first:
+            found = image_size(path)
+            if found != size and not made_small:
                 raise UserError(
-                    f"scene '{scene.name}' mixes sizes: the image of frame '{name}' is {size[0]} x {size[1]}, "
-                    f"that of '{scene.train.names[0]}' {first[0]} x {first[1]}; resize the images to one size"
+                    f"scene '{scene.name}': the intrinsics of frame '{name}' are of {size[0]} x {size[1]} pixels, its "
+                    f"image has {found[0]} x {found[1]}; {_remedy(size, found)}"
                 )
+
+
+def _remedy(camera: tuple[int, int], image: tuple[int, int]) -> str:
+    across, down = image[0] / camera[0], image[1] / camera[1]
+    if abs(across / down - 1) < 0.02:
+        return f"multiply its focal lengths and centre by {across:.4g}, or bring the images in their first size"
+    if abs(image[0] / camera[1] - image[1] / camera[0]) < 0.02:
+        return "it was turned on its side: bring it as the camera took it, or turn its pose and intrinsics too"
+    return "bring the images as they were when the intrinsics were made: these were cropped or squeezed"

@@ -40,15 +40,19 @@ def run(
     parameters: dict[str, Any] | None = None,
     features: np.ndarray | None = None,
     sharpness: np.ndarray | None = None,
+    candidates: np.ndarray | None = None,
+    keep: Sequence[int] = (),
 ) -> dict[str, Any]:
     """Chooses `count` training views and returns what `selection.json` holds.
 
-    `features` (N, D) and `sharpness` (N,) have a row per training view in capture order. The random generator is
-    seeded by scene, selector and seed but not by the count, so that greedy orders are prefixes of each other over
-    ratios. Test views are not looked at.
+    `features` (N, D) and `sharpness` (N,) have a row per training view in capture order. `candidates` (N,) bool are the
+    views that may be chosen, all by default: the others are as if the capture did not have them. The views at `keep`
+    are chosen first, whatever the selector thinks of them, and the others beside them. The random generator is seeded
+    by scene, selector and seed but not by the count, so that greedy orders are prefixes of each other over ratios. Test
+    views are not looked at.
 
     Raises UserError for an unknown selector or parameter (with the nearest right one), a parameter of a wrong type, a
-    count outside [1, N], and features or sharpness of a wrong length or with NaN.
+    count outside [1, N] or less than the views to keep, and features or sharpness of a wrong length or with NaN.
     """
     n = len(scene.train)
     if n == 0:
@@ -63,12 +67,15 @@ def run(
     if options.get("sharpness") and sharpness is None:
         raise UserError(f"'{selector}' was asked to weigh sharpness, but the sharpness of the frames was not given")
     code = code_of(selector, scene.format)  # as it is when it is loaded
-    views = _views(scene.train, features, sharpness)
+    among, kept = _among(scene, count, candidates, keep)
+    views = _views(scene.train, features, sharpness, among, kept)
     begin = time.perf_counter()
     choice = plugin.select(views, count, generator("select", scene.name, selector, seed), **options)
     elapsed = time.perf_counter() - begin
     similarity_s = choice.seconds.get("similarity", 0.0)
-    indices = [int(i) for i in choice.indices]
+    if len(kept) and not set(kept) <= set(choice.indices.tolist()):
+        raise UserError(f"'{selector}' does not keep views; leave --keep out, or use maxmin, logdet, uniform or random")
+    indices = [int(i) for i in (choice.indices if among is None else among[choice.indices])]
     record = {
         "schema": 1,
         "scene": scene.name,
@@ -91,7 +98,29 @@ def run(
         "greedy": is_greedy(selector, options),
         "viewbench": __version__,
     }
+    if among is not None:
+        record |= {"candidates": len(among), "kept": len(kept)}
     return record | ({"notes": dict(choice.notes)} if choice.notes else {})
+
+
+def _among(
+    scene: Scene, count: int, candidates: np.ndarray | None, keep: Sequence[int]
+) -> tuple[np.ndarray | None, list[int]]:
+    """Indices of the views that may be chosen (None for all, with nothing to keep), and which of those are kept."""
+    if candidates is None and not len(keep):
+        return None, []
+    allowed = np.ones(len(scene.train), dtype=bool) if candidates is None else np.array(candidates, dtype=bool)
+    wanted = list(dict.fromkeys(int(i) for i in keep))
+    allowed[wanted] = True
+    among = np.flatnonzero(allowed)
+    if len(wanted) > count:
+        raise UserError(f"count {count} is less than the {len(wanted)} views to keep; ask for more, or keep fewer")
+    if len(among) < count:
+        raise UserError(
+            f"count {count} is more than the {len(among)} of {len(scene.train)} training views that may be chosen"
+        )
+    place = {int(i): k for k, i in enumerate(among)}
+    return among, [place[i] for i in wanted]
 
 
 def _without_poses(scene: Scene, selector: str, options: dict[str, Any], features: np.ndarray | None) -> dict[str, Any]:
@@ -111,7 +140,19 @@ def _without_poses(scene: Scene, selector: str, options: dict[str, Any], feature
     return options | {"factors": ["sem"]}
 
 
-def _views(train: Split, features: np.ndarray | None, sharpness: np.ndarray | None) -> Views:
+def _views(
+    train: Split,
+    features: np.ndarray | None,
+    sharpness: np.ndarray | None,
+    among: np.ndarray | None = None,
+    kept: Sequence[int] = (),
+) -> Views:
+    """What the selector sees: the training views, or those `among` them alone."""
+    rows = None if features is None else unit_rows(features, train.names)
+    sharp = None if sharpness is None else _per_frame(sharpness, train.names)
+    if among is not None:
+        train = train.subset(among)
+        rows, sharp = (None if values is None else values[among] for values in (rows, sharp))
     cameras = train.cameras
     bad = np.flatnonzero(~np.isfinite(cameras.c2w).all(axis=(1, 2)))
     if len(bad):
@@ -120,10 +161,11 @@ def _views(train: Split, features: np.ndarray | None, sharpness: np.ndarray | No
     return Views(
         positions=normalise(cameras.positions),
         rotations=np.ascontiguousarray(cameras.rotations, dtype=np.float64),
-        features=None if features is None else unit_rows(features, train.names),
+        features=rows,
         intrinsics=np.stack(intrinsics, axis=1).astype(np.float64),
         times=train.times,
-        sharpness=None if sharpness is None else _per_frame(sharpness, train.names),
+        sharpness=sharp,
+        kept=np.array(kept, dtype=np.int64),
     )
 
 

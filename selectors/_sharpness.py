@@ -6,6 +6,8 @@ A greedy selector with weight w takes the view of largest gain · q^w. A frame b
 blurred, and is not taken before some frame of its window has been.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 WINDOW = 15  # frames, half a second of video: motion blur comes and goes within it
@@ -13,9 +15,13 @@ FLOOR = 1e-3  # of q, so that no frame is lost for good
 
 
 class Preference:
-    """Picks the view of largest gain; with sharpness and weight w > 0, the largest gain · q^w among those allowed."""
+    """Picks the view of largest gain; with sharpness and weight w > 0, the largest gain · q^w among those allowed.
 
-    def __init__(self, sharpness: np.ndarray | None, weight: float = 0.0):
+    The views `kept` come first, in their order, whatever their gains.
+    """
+
+    def __init__(self, sharpness: np.ndarray | None, weight: float = 0.0, kept: Sequence[int] | np.ndarray = ()):
+        self.kept = [int(i) for i in kept]
         self.sharpness = sharpness if weight > 0 else None
         if self.sharpness is None:
             return
@@ -26,6 +32,8 @@ class Preference:
 
     def best(self, gains: np.ndarray) -> int:
         """Index of the best gain (N,), −∞ for views that are gone; ties go to the sharper, then the earlier."""
+        if self.kept:
+            return self.kept[0]
         if self.sharpness is None:
             return int(gains.argmax())
         scores = gains * self.weights
@@ -37,11 +45,15 @@ class Preference:
 
     def take(self, i: int) -> None:
         """Tells that view i was chosen: its window has had its first choice."""
+        if self.kept and self.kept[0] == i:
+            del self.kept[0]
         if self.sharpness is not None:
             self.allowed[max(0, i - WINDOW // 2) : i + WINDOW // 2 + 1] = True
 
     def any(self, rng: np.random.Generator, n: int) -> int:
         """One of the n views at random, not a blurred one."""
+        if self.kept:
+            return self.kept[0]
         if self.sharpness is None:
             return int(rng.integers(n))
         return int(rng.choice(np.flatnonzero(self.allowed)))

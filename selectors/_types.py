@@ -36,6 +36,7 @@ class Views:
     intrinsics: np.ndarray | None = None  # (N, 6) float64: fx, fy, cx, cy, width, height in pixels
     times: np.ndarray | None = None  # (N,) float64 seconds
     sharpness: np.ndarray | None = None  # (N,) float64, larger is sharper
+    kept: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))  # (J,) views to be chosen first, in order
 
     def __len__(self) -> int:
         return len(self.positions)

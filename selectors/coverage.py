@@ -68,7 +68,7 @@ def select(views: Views, count: int, rng: np.random.Generator, lam: float = 0.05
     for k in range(count):
         of_count = (state.counts[state.counts > 0] ** lam).sum() + gain.of_count
         total = (k + 1) ** -lam * of_count + state.present.sum() + gain.of_angle + gone
-        pick = int((total >= total.max() - TIE).argmax())
+        pick = int(views.kept[k]) if k < len(views.kept) else int((total >= total.max() - TIE).argmax())
         chosen[k], gains[k], gone[pick] = pick, total[pick], -np.inf
         size = kernels.observe(nodes, positions[pick], rotations[pick], cameras[pick], seen)
         kernels.add(seen.first(size), lam, weight, state, observers, gain)

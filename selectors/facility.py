@@ -36,7 +36,7 @@ def select(
     """
     begin = time.perf_counter()
     similar = similarity(views, alpha, beta, sigma, factors)
-    prefer = Preference(views.sharpness, sharpness)
+    prefer = Preference(views.sharpness, sharpness, views.kept)
     n = len(views)
     columns = Columns(similar.columns, n)
     served = np.zeros(n)  # max_{j ∈ S} M_ij of every view i

@@ -39,7 +39,7 @@ def select(
         raise UserError("'kcenter' on the factor 'sem' needs image features; name an encoder or give --features")
     weight = {"pos": (1.0, 0.0), "ang": (0.0, 1.0), "sem": (0.0, 0.0)}[factors[0]]
     similar = similarity(views, *weight, factors=factors)
-    prefer = Preference(views.sharpness, sharpness)
+    prefer = Preference(views.sharpness, sharpness, views.kept)
     distance = np.full(len(views), np.inf)
     chosen = np.empty(count, dtype=np.int64)
     gains = np.empty(count)

@@ -59,12 +59,14 @@ def select(
         raise UserError(f"regularise = {regularise} must be 0 or a positive number; it is λ in log det(I + M / λ)")
     if sample and regularise:
         raise UserError("'logdet' either samples or regularises; leave out one of the two")
+    if sample and len(views.kept):
+        raise UserError("'logdet' keeps no views when it samples; leave out --keep or 'sample'")
     if sample and len(views) > MOST_TO_SAMPLE:
         raise UserError(f"'logdet' samples from at most {MOST_TO_SAMPLE} views, not {len(views)}; leave out 'sample'")
     begin = time.perf_counter()
     similar = similarity(views, alpha, beta, sigma, factors)
     prepared_s = time.perf_counter() - begin
-    prefer = Preference(views.sharpness, sharpness)
+    prefer = Preference(views.sharpness, sharpness, views.kept)
     precision = len(views) * np.finfo(float).eps * (1 + regularise)
     if sample:
         indices, gains = _sample(similar, count, precision, rng), None

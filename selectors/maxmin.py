@@ -42,7 +42,7 @@ def select(
     begin = time.perf_counter()
     similar = similarity(views, alpha, beta, sigma, factors)
     prepared_s = time.perf_counter() - begin
-    prefer = Preference(views.sharpness, sharpness)
+    prefer = Preference(views.sharpness, sharpness, views.kept)
     nearest = Nearest(similar)
     chosen = np.empty(count, dtype=np.int64)
     gains = np.empty(count)

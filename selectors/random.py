@@ -11,5 +11,9 @@ PARAMETERS: dict = {}
 
 
 def select(views: Views, count: int, rng: np.random.Generator) -> Choice:
-    """The first `count` of a random order of all views, so that a larger count with the same seed adds views only."""
-    return Choice(rng.permutation(len(views))[:count])
+    """The first `count` of a random order of all views, so that a larger count with the same seed adds views only.
+
+    Views to keep stand at the head of the order.
+    """
+    order = rng.permutation(len(views))
+    return Choice(np.concatenate([views.kept, order[~np.isin(order, views.kept)]])[:count])

@@ -99,7 +99,7 @@ def test_it_brings_what_choosing_needs_and_nothing_else(light):
 
 def test_views_of_a_colmap_capture_are_chosen(light, small_room, tmp_path):
     scene = open_scene(str(small_room), Settings(Path()))
-    write_scene(scene, np.arange(len(scene.train)), tmp_path / "capture", "colmap", copy=True)
+    write_scene(scene, np.arange(len(scene.train)), tmp_path / "capture", "colmap", links="copy")
     assert "colmap" in light.viewbench("info", tmp_path / "capture").stdout
     done = light.viewbench("select", tmp_path / "capture", "--count", "4", "--out", tmp_path / "chosen")
     record = json.loads((tmp_path / "chosen" / "selection.json").read_text(encoding="utf-8"))

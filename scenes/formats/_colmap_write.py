@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import UserError
+from ..companions import beside
 from ..image_files import is_file, stored_name
 from ..splits import LEAST_TRACK
 from ..subset import place_image
@@ -17,39 +18,48 @@ FOLDERS = ("images", "images_2", "images_4", "images_8")
 TEST = "test.txt"  # beside the model: names of the images that are held out, one a line
 TEST_MODEL = "test/sparse/0"  # the held-out images' own model, their pictures in test/images
 BOTH_MODEL = "colmap/sparse/0"  # nerfstudio's, with the images of both splits
+EVALUATED = 8  # nerfstudio's curves are of every 8th image where there is no test split
 
 
-def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
-    """Writes the chosen views as sparse/0, with images/ and what smaller ones there are beside it.
+def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> list[str]:
+    """Writes the chosen views as sparse/0, with images/, and what masks and smaller copies there are, beside it.
 
     COLMAP has no splits, and its readers train on what is in sparse/0 whatever else lies about. So the test views have
     a model, and a folder, of their own: test/sparse/0 and test/images. Nerfstudio wants both in one model, and finds
     it in colmap/sparse/0 with the lists of names that it obeys: train_list.txt, val_list.txt and test_list.txt (none
-    of it where a name has a line break, which cuts it in two there). sparse/0/test.txt, the list of the 3DGS authors'
-    reader, names the test views again (as JSON where a name has a line break).
+    of it where a name has a line break, which cuts it in two there). Without them it would hold out every 8th of the
+    chosen views; where there is no test split those are listed for its curves, and trained on all the same.
+    sparse/0/test.txt, the list of the 3DGS authors' reader, names the test views again (as JSON where a name has a line
+    break).
 
     A scene that was read from COLMAP keeps its cameras, the tracks between the views written, and all points that at
     least two training views of the capture see, whichever were chosen; any other becomes a model of pinhole (or
-    OpenCV) cameras, with its points but without tracks.
+    OpenCV) cameras, with its points but without tracks. Returns notes for people.
     """
     train, test = scene.train.subset(indices), scene.test
     names = _stored_names(scene, train, test)
     smaller = _smaller_folders(scene, [*names["train"], *names["test"]])
     _write_model(out, "sparse/0", scene, names, ("train",), train.cameras)
     _place(scene, names["train"], train.paths, smaller, out, copy)
-    if not len(test):
-        return
-    _place(scene, names["test"], test.paths, smaller, out, copy)
-    _write_model(out / "test", "sparse/0", scene, names, ("test",), test.cameras)
-    _place(scene, names["test"], test.paths, smaller, out / "test", copy)
-    lines = [json.dumps(name) if "\n" in name else name for name in names["test"]]
-    (out / "sparse" / "0" / TEST).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    if scene.format == "colmap":
+        for source, place in beside(scene.root, [*names["train"], *names["test"]]):
+            place_image(source, out / place, copy)
+    if len(test):
+        _place(scene, names["test"], test.paths, smaller, out, copy)
+        _write_model(out / "test", "sparse/0", scene, names, ("test",), test.cameras)
+        _place(scene, names["test"], test.paths, smaller, out / "test", copy)
+        lines = [json.dumps(name) if "\n" in name else name for name in names["test"]]
+        (out / "sparse" / "0" / TEST).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
     if any(name.splitlines() != [name] for name in (*names["train"], *names["test"])):
-        return
-    if _write_model(out, BOTH_MODEL, scene, names, ("train", "test"), train.cameras, test.cameras):
-        for split, key in (("train", "train"), ("val", "test"), ("test", "test")):
-            text = "".join(f"{name}\n" for name in names[key])
-            (out / f"{split}_list.txt").write_text(text, encoding="utf-8")
+        return []
+    splits, cameras = (
+        (("train", "test"), (train.cameras, test.cameras)) if len(test) else (("train",), (train.cameras,))
+    )
+    if _write_model(out, BOTH_MODEL, scene, names, splits, *cameras):
+        held = names["test"] or names["train"][::EVALUATED]
+        for split, listed in (("train", names["train"]), ("val", held), ("test", held)):
+            (out / f"{split}_list.txt").write_text("".join(f"{name}\n" for name in listed), encoding="utf-8")
+    return []
 
 
 def _stored_names(scene: Scene, train: Split, test: Split) -> dict[str, list[str]]:

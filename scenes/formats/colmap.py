@@ -33,23 +33,57 @@ def detect(root: Path) -> str | None:
     return None if model is None else f"it has a model in {model.relative_to(root)}"
 
 
-def _model(root: Path) -> Path | None:
-    return next((root / folder for folder in MODELS if _is_model(root / folder)), None)
+def _model(root: Path, number: int | None = None) -> Path | None:
+    """The folder of the model to read: where a capture fell apart into several, the one with most images.
+
+    Raises UserError where there is none with the `number` that was asked for.
+    """
+    numbered = _numbered(root)
+    if number is not None:
+        if number not in numbered:
+            known = ", ".join(map(str, numbered)) or "none"
+            raise UserError(f"'{root / 'sparse'}' has no model {number} (there are: {known}); name one of those")
+        return root / "sparse" / str(number)
+    if len(numbered) > 1:
+        return root / "sparse" / str(max(numbered, key=lambda key: (numbered[key], -key)))
+    return next(
+        (root / folder for folder in (*MODELS, *(f"sparse/{key}" for key in numbered)) if _is_model(root / folder)),
+        None,
+    )
 
 
-def read(root: Path) -> Scene:
+def _numbered(root: Path) -> dict[int, int]:
+    """Numbers of the models in sparse/, with how many images each has."""
+    folders = [path for path in (root / "sparse").glob("[0-9]*") if path.name.isdecimal() and _is_model(path)]
+    return {int(path.name): _image_count(path) for path in sorted(folders, key=lambda path: int(path.name))}
+
+
+def _image_count(model: Path) -> int:
+    """Images of a model as its file says, without reading it whole. 0 where it cannot be told."""
+    try:
+        if (model / "images.bin").is_file():
+            with (model / "images.bin").open("rb") as file:
+                return int.from_bytes(file.read(8), "little")
+        with (model / "images.txt").open(encoding="utf-8", errors="replace") as file:
+            return sum(not line.startswith("#") for line in file) // 2  # two lines an image
+    except OSError:
+        return 0
+
+
+def read(root: Path, model_number: int | None = None) -> Scene:
     """Reads the registered images in natural order of their names, with points and tracks.
 
-    Raises UserError for a model that pycolmap cannot read, for image names that leave the folder of images, and for
-    cameras without a focal length.
+    Of several models in sparse/ it is that with most images, or the one with the number that is given. Raises UserError
+    for a model that pycolmap cannot read, for image names that leave the folder of images, and for cameras without a
+    focal length.
     """
-    model = _model(root)
+    model = _model(root, model_number)
     if model is None:
         raise UserError(f"'{root}' has no COLMAP model: no cameras, images and points3D in sparse/0")
     reconstruction, images = _registered(model)
     folder = next((root / name for name in FOLDERS if (root / name).is_dir()), root / "images")
     every, points = _split(reconstruction, images, folder), _points(reconstruction, images)
-    files, notes = [model], list(_others(model))
+    files, notes = [model], [*_others(root, model), *_resized(reconstruction, images, every, folder)]
     details: dict[str, Any] = {"images": folder}
     test = _test_model(root, model)
     if test is not None:
@@ -71,7 +105,7 @@ def read(root: Path) -> Scene:
     points, left_out = training_points(points, kept, len(images))
     if (root / BOUNDS).is_file() and not len(held_split):
         details["holdout"] = "every:8"  # unless somebody says otherwise
-        notes.append(
+        details["holdout_note"] = (
             f"{BOUNDS} is here, as in Mip-NeRF 360 and LLFF: every 8th image tests, unless --holdout says otherwise"
         )
     return Scene(
@@ -149,16 +183,43 @@ def _split(reconstruction: Any, images: Sequence[Any], folder: Path) -> Split:
         distortion=values[:, 6:] if values[:, 6:].any() else None,
     )
     names = tuple(image.name for image in images)
-    if folder.name != "images":  # images_2, images_4, images_8: the model speaks of the full size
-        cameras = cameras.scaled(image_size(folder / names[0])[0])
+    paths = tuple(folder / name for name in names)
     lens = next((name for image in images if (name := _lens(reconstruction.cameras[image.camera_id]))), "")
-    return Split(names, tuple(folder / name for name in names), cameras, lens=lens)
+    return Split(names, paths, _fitted(cameras, paths), lens=lens)
 
 
-def _others(model: Path) -> tuple[str, ...]:
+def _fitted(cameras: Cameras, paths: Sequence[Path]) -> Cameras:
+    """The cameras at the size that the images have: images_2 and the like, and images that were resized where they lie.
+
+    Where an image has another shape than its camera the camera stays as it is; `check_present` finds it.
+    """
+    sizes = np.stack([cameras.width, cameras.height], axis=1)
+    one = bool((sizes == sizes[0]).all())
+    heads = [image_size(path) if is_file(path) else None for path in (paths[:1] if one else paths)]
+    found = np.array([head or size for head, size in zip(heads * (len(paths) if one else 1), sizes, strict=True)])
+    scale = found / sizes
+    # Sizes are whole numbers: the two scales may differ by a pixel of the smaller picture.
+    alike = np.abs(scale[:, 0] - scale[:, 1]) * sizes.max(axis=1) <= 1.5 * np.maximum(1, scale.max(axis=1))
+    found = np.where(alike[:, None], found, sizes).astype(np.int64)
+    return cameras if (found == sizes).all() else cameras.resized(found[:, 0], found[:, 1])
+
+
+def _others(root: Path, model: Path) -> tuple[str, ...]:
     """A note where the capture fell apart into several models."""
-    models = [path for path in model.parent.glob("[0-9]*") if path.is_dir()] if model.name == "0" else []
-    return (f"{len(models)} models in {model.parent.name}/; only the first is read",) if len(models) > 1 else ()
+    numbered = _numbered(root)
+    if len(numbered) < 2 or model.parent != root / "sparse":
+        return ()
+    counts = ", ".join(f"{key} with {count}" for key, count in numbered.items())
+    return (f"sparse/ has {len(numbered)} models (images: {counts}); {model.name} is read, --model names another",)
+
+
+def _resized(reconstruction: Any, images: Sequence[Any], frames: Split, folder: Path) -> tuple[str, ...]:
+    """A note where the images in images/ are not as big as the model's cameras."""
+    camera = reconstruction.cameras[images[0].camera_id]
+    size, found = (camera.width, camera.height), (int(frames.cameras.width[0]), int(frames.cameras.height[0]))
+    if folder.name != "images" or size == found:
+        return ()
+    return (f"images are {found[0]} x {found[1]}, the model's cameras {size[0]} x {size[1]}: the cameras were scaled",)
 
 
 def _listed(file: Path) -> list[str]:

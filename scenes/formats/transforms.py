@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import UserError
-from ...common.files import read_json, write_json
-from ..image_files import image_size, is_file, leaves, stored_name
-from ..subset import place_image
+from ...common.files import read_json
+from ..image_files import image_size, is_file, leaves
 from ..types import Cameras, Points, Scene, Split
+from ._transforms_write import LENS, SINGLE, TESTS, TRAIN, write
+
+__all__ = ["WRITABLE", "detect", "read", "write"]
 
 WRITABLE = True
-SINGLE, TRAIN, TESTS = "transforms.json", "transforms_train.json", ("transforms_test.json", "transforms_val.json")
-COMPANIONS = ("mask_path", "depth_file_path")  # nerfstudio's other files of a frame, which it insists on
-LENS = ("k1", "k2", "p1", "p2", "k3")  # in OpenCV's order
 LENSES = ("", "SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV")  # camera_model, where it is named
 SUFFIXES = (".png", ".jpg", ".jpeg", ".JPG", ".PNG")  # tried in turn where file_path has none, as Blender's has not
 
@@ -44,8 +43,10 @@ def read(root: Path, allow_outside: bool = False) -> Scene:
     tables = {key: read_json(file, "transforms") for key, file in files.items()}
     splits = {key: _split(root, files[key], table, allow_outside) for key, table in tables.items()}
     train, test_split = splits["train"], splits.get("test")
+    notes: tuple[str, ...] = ()
     if test_split is None:
-        train, test_split = _listed(files["train"], tables["train"], train)
+        train, test_split, spare, notes = _listed(files["train"], tables["train"], train)
+        splits |= {"spare": spare} if len(spare) else {}
     points, point_file = _points(root, tables["train"])
     return Scene(
         name=root.name,
@@ -55,27 +56,41 @@ def read(root: Path, allow_outside: bool = False) -> Scene:
         test=test_split,
         points=points,
         files=(*files.values(), *([point_file] if point_file else [])),
+        notes=notes,
         details={"tables": tables, "names": {key: file.name for key, file in files.items()}}
         | ({"spare": splits["spare"]} if "spare" in splits else {}),
     )
 
 
-def _listed(file: Path, table: dict, frames: Split) -> tuple[Split, Split]:
-    """Both splits by nerfstudio's lists of file names. Raises UserError for a name that no frame has."""
+def _listed(file: Path, table: dict, frames: Split) -> tuple[Split, Split, Split, tuple[str, ...]]:
+    """Training, test and validation split by nerfstudio's lists of file names, and notes.
+
+    The test split is that of test_filenames or, where there is none, of val_filenames; the third is the other list
+    without what is in the first two. Raises UserError for a name that no frame has, and for frames that are listed both
+    for training and for testing, unless all test frames are: nerfstudio needs some to evaluate, and a capture without a
+    test split lists training views.
+    """
+    none = frames.subset([])
     if not isinstance(table.get("train_filenames"), list):
-        return frames, frames.subset([])
+        return frames, none, none, ()
     index = {name: i for i, name in enumerate(frames.names)}
-    chosen = []
-    for key in ("train_filenames", "test_filenames" if table.get("test_filenames") else "val_filenames"):
-        listed = table.get(key) or []
-        unknown = [name for name in listed if not isinstance(name, str) or name not in index]
+    listed: dict[str, set[int]] = {}
+    for key in ("train", "test", "val"):
+        names = table.get(f"{key}_filenames") or []
+        unknown = [name for name in names if not isinstance(name, str) or name not in index]
         if unknown:
-            raise UserError(f"'{file}': {key} names {unknown[0]!r}, which no frame has")
-        chosen.append(sorted({index[name] for name in listed}))
-    both = set(chosen[0]) & set(chosen[1])
+            raise UserError(f"'{file}': {key}_filenames names {unknown[0]!r}, which no frame has")
+        listed[key] = {index[name] for name in names}
+    train = listed["train"]
+    test, spare = (listed["test"], listed["val"]) if listed["test"] else (listed["val"], set())
+    if test and test <= train:
+        return frames.subset(sorted(train)), none, frames.subset(sorted(spare - train)), ()
+    both = train & test
     if both:
         raise UserError(f"'{file}': frame '{frames.names[min(both)]}' is listed for training and for testing")
-    return frames.subset(chosen[0]), frames.subset(chosen[1])
+    left = len(frames) - len(train | test | spare)
+    notes = (f"{left} of {len(frames)} frames are in none of its lists and are left out",) if left else ()
+    return frames.subset(sorted(train)), frames.subset(sorted(test)), frames.subset(sorted(spare - train - test)), notes
 
 
 def _split(root: Path, file: Path, table: Any, allow_outside: bool) -> Split:
@@ -132,8 +147,13 @@ def _lens(camera: dict) -> str:
 
 
 def _image(root: Path, name: str, file: Path, allow_outside: bool) -> Path:
-    if "\0" in name or (leaves(name) and not allow_outside):
-        raise UserError(f"'{file}': file_path '{name}' leaves the scene folder; give --allow-outside if that is meant")
+    if "\0" in name:
+        raise UserError(f"'{file}': file_path {name!r} is no name of a file; correct it")
+    if leaves(name) and not allow_outside:
+        raise UserError(
+            f"'{file}': file_path '{name}' leaves the scene folder; give --allow-outside if that is meant, or set "
+            "allow_outside = true for a scene of environment.toml"
+        )
     path = root / name
     return next((found for end in ("", *SUFFIXES) if is_file(found := root / f"{name}{end}")), path)
 
@@ -185,94 +205,3 @@ def _points(root: Path, table: dict) -> tuple[Points | None, Path | None]:
         if not leaves(name) and is_file(root / name):
             return read_points(root / name), root / name
     return None, None
-
-
-def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
-    """Writes what was read with fewer frames: a single transforms.json stays one, several files stay several.
-
-    A scene that was read from this format keeps all its own keys and each frame's mask and depth; one from another
-    format becomes transforms_train and transforms_test, or a single file where it has no test split. In a single file
-    the test split, if any, stands in nerfstudio's lists of file names. Points are written as points3d.ply.
-    """
-    from ..ply import write_points
-
-    details = scene.details if scene.format == "transforms" else {}
-    own, names = details.get("tables", {}), {"train": TRAIN, "test": TESTS[0], **details.get("names", {})}
-    head = {key: value for key, value in own.get("train", {}).items() if not key.endswith("_filenames")}
-    splits = {"train": scene.train.subset(indices), "test": scene.test}
-    splits |= {"spare": details["spare"]} if "spare" in details else {}
-    if not own:
-        head = _shared([splits["train"].cameras, scene.test.cameras])
-    if scene.points is not None:
-        write_points(out / "points3d.ply", scene.points)
-        head["ply_file_path"] = "points3d.ply"
-    frames, number = {}, 0
-    for key, split in splits.items():
-        frames[key] = _frames(split, own, head, number, scene.root, out, copy)
-        number += len(split)
-    held = frames["test"]
-    if not (names["train"] == SINGLE if own else not held):
-        for key, listed in frames.items():
-            write_json(out / names[key], {**head, **(own.get(key, {}) if key != "train" else {}), "frames": listed})
-        return
-    lists = {}
-    if held:
-        held_names = [frame["file_path"] for frame in held]
-        lists = {"train_filenames": [frame["file_path"] for frame in frames["train"]]}
-        lists |= {"val_filenames": held_names, "test_filenames": held_names}
-    write_json(out / SINGLE, {**head, **lists, "frames": frames["train"] + held})
-
-
-def _frames(
-    split: Split, own: dict[str, dict], head: dict[str, Any], number: int, root: Path, out: Path, copy: bool
-) -> list[dict[str, Any]]:
-    """The frames of a split as they are written, their images placed; outside paths come to images/."""
-    known = {frame["file_path"]: frame for table in own.values() for frame in table["frames"]}
-    made = []
-    for i, (name, source) in enumerate(zip(split.names, split.paths, strict=True)):
-        if name in known:
-            frame = dict(known[name])
-            stored = stored_name(name, source, number + i)
-            if leaves(name):
-                frame["file_path"] = stored
-            _place_companions(frame, root, out, copy)
-        else:
-            stored = stored_name(f"images/{name}", source, number + i)
-            camera = _camera(split.cameras[i])
-            frame = {"file_path": stored, **{key: value for key, value in camera.items() if key not in head}}
-            if split.times is not None:
-                frame["time"] = float(split.times[i])
-        place_image(source, out / stored, copy)
-        made.append(frame)
-    return made
-
-
-def _place_companions(frame: dict[str, Any], root: Path, out: Path, copy: bool) -> None:
-    """Mask and depth beside the image; frames may share one. What lies outside the folder is named in full."""
-    for key in COMPANIONS:
-        name = frame.get(key)
-        if not isinstance(name, str) or not is_file(root / name):
-            continue
-        if leaves(name):
-            frame[key] = str((root / name).resolve())
-        elif not (out / name).exists():
-            place_image(root / name, out / name, copy)
-
-
-def _shared(groups: list[Cameras]) -> dict[str, Any]:
-    """The intrinsics that all cameras have, with the angle that Blender-form readers want; nothing if they differ."""
-    tables = [_camera(camera) for cameras in groups for camera in cameras]
-    for table in tables:
-        del table["transform_matrix"]
-    if any(table != tables[0] for table in tables):
-        return {}
-    return {"camera_angle_x": 2 * math.atan(0.5 * tables[0]["w"] / tables[0]["fl_x"]), **tables[0]}
-
-
-def _camera(camera: Cameras) -> dict[str, Any]:
-    values = {"fl_x": camera.fx, "fl_y": camera.fy, "cx": camera.cx, "cy": camera.cy}
-    table: dict[str, Any] = {key: float(value[0]) for key, value in values.items()}
-    table |= {"w": int(camera.width[0]), "h": int(camera.height[0])}
-    if camera.distortion is not None:
-        table |= {"camera_model": "OPENCV", **dict(zip(LENS, camera.distortion[0].tolist(), strict=True))}
-    return {**table, "transform_matrix": camera.c2w[0].tolist()}

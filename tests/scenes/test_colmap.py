@@ -168,7 +168,7 @@ def test_real_captures(data_root):
 def test_subsets_of_real_captures_open_again(data_root, tmp_path, name):
     scene = opened(data_root / name, holdout="every:8")
     chosen = [7, 0, 3]
-    assert write_subset(scene, {"indices": chosen}, tmp_path / "out") == scene.format
+    assert write_subset(scene, {"indices": chosen}, tmp_path / "out")[0] == scene.format
     again = opened(tmp_path / "out")
     order = [again.train.names.index(scene.train.names[i]) for i in chosen]
     np.testing.assert_allclose(again.train.cameras.c2w[order], scene.train.cameras.c2w[chosen], atol=1e-9)

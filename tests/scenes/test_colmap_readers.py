@@ -19,6 +19,7 @@ from viewbench.common.settings import load as load_settings
 from viewbench.scenes.digest import scene_sha256
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.subset import write_scene, write_subset
+from viewbench.scenes.validate import check_present
 
 NAMES = [f"frame{number:02d}.png" for number in range(24)]
 CHOSEN = [20, 3, 7, 11, 15]  # in the order chosen
@@ -216,12 +217,96 @@ def test_a_list_may_have_blanks_and_names_that_were_never_registered(tmp_path):
         open_scene(str(folder), load_settings())
 
 
-def test_a_capture_without_a_test_split_has_one_model(tmp_path):
-    folder = colmap(tmp_path / "in", NAMES[:6])
-    write_subset(open_scene(str(folder), load_settings()), {"indices": [4, 1]}, tmp_path / "out")
-    assert images_of(tmp_path / "out" / "sparse" / "0") == [NAMES[1], NAMES[4]]
+def test_without_a_test_split_nerfstudio_trains_on_all_chosen_views(tmp_path, nerfstudio):
+    """Its default would hold every 8th out; it needs some to evaluate, which are trained on too."""
+    folder = colmap(tmp_path / "in", NAMES)
+    model = pycolmap.Reconstruction(folder / "sparse" / "0")
+    model.add_point3D(np.zeros(3), pycolmap.Track(), np.zeros(3, np.uint8))
+    model.write(folder / "sparse" / "0")
+    chosen = list(range(0, 24, 2))
+    write_subset(open_scene(str(folder), load_settings()), {"indices": chosen[::-1]}, tmp_path / "out")
+    names = [NAMES[i] for i in chosen]
+    assert images_of(tmp_path / "out" / "sparse" / "0") == names
     assert not (tmp_path / "out" / "test").exists()
-    assert not (tmp_path / "out" / "colmap").exists()
+    assert nerfstudio_split(nerfstudio, tmp_path / "out", "train") == names
+    assert nerfstudio_split(nerfstudio, tmp_path / "out", "val") == [names[0], names[8]]
+    again = open_scene(str(tmp_path / "out"), load_settings())
+    assert (list(again.train.names), len(again.test)) == (names, 0)
+
+
+def test_masks_come_along_under_the_names_of_both_tools(tmp_path, nerfstudio):
+    """COLMAP looks for NAME.png.png, nerfstudio for NAME.png; of another frame's nothing comes."""
+    folder = colmap(tmp_path / "in", [f"sub/{name}" for name in NAMES[:6]])
+    for name in NAMES[:6]:
+        for place in (f"masks/sub/{name}.png", f"masks_2/sub/{name}.png", f"depths/sub/{name}"):
+            picture(folder / place, (12, 8))
+    model = pycolmap.Reconstruction(folder / "sparse" / "0")
+    model.add_point3D(np.zeros(3), pycolmap.Track(), np.zeros(3, np.uint8))
+    model.write(folder / "sparse" / "0")
+    write_subset(open_scene(str(folder), load_settings()), {"indices": [1, 3]}, tmp_path / "out")
+    for place in ("masks", "masks_2"):
+        found = sorted(path.name for path in (tmp_path / "out" / place).rglob("*.png"))
+        assert found == [f"{NAMES[1]}.png", f"{NAMES[3]}.png"]
+    parser = nerfstudio.ColmapDataParserConfig(data=tmp_path / "out", downscale_factor=1, depths_path=Path("depths"))
+    outputs = parser.setup().get_dataparser_outputs("train")
+    assert all(path.is_file() for path in outputs.metadata["depth_filenames"])
+
+
+def test_the_largest_of_several_models_is_read_or_the_one_that_is_named(tmp_path):
+    folder = colmap(tmp_path / "in", NAMES[:3])
+    for number, names in ((1, NAMES[3:12]), (2, NAMES[12:14])):
+        other = colmap(tmp_path / f"other{number}", names)
+        (other / "sparse" / "0").rename(folder / "sparse" / str(number))
+        for name in names:
+            picture(folder / "images" / name, (12, 8))
+    scene = open_scene(str(folder), load_settings())
+    assert list(scene.train.names) == NAMES[3:12]
+    assert "3 models (images: 0 with 3, 1 with 9, 2 with 2); 1 is read" in " ".join(scene.notes)
+    assert list(open_scene(str(folder), load_settings(), model=2).train.names) == NAMES[12:14]
+    with pytest.raises(UserError, match=r"no model 7 \(there are: 0, 1, 2\)"):
+        open_scene(str(folder), load_settings(), model=7)
+    write_subset(scene, {"indices": [0, 5]}, tmp_path / "out")
+    assert images_of(tmp_path / "out" / "sparse" / "0") == [NAMES[3], NAMES[8]]
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_a_capture_whose_model_is_not_number_0_is_found(tmp_path, text):
+    folder = colmap(tmp_path / "in", NAMES[:3])
+    (folder / "sparse" / "0").rename(folder / "sparse" / "3")
+    if text:
+        model = pycolmap.Reconstruction(folder / "sparse" / "3")
+        for path in (folder / "sparse" / "3").iterdir():
+            path.unlink()
+        model.write_text(folder / "sparse" / "3")
+    assert len(open_scene(str(folder), load_settings()).train) == 3
+
+
+def test_images_that_were_resized_where_they_lie_have_smaller_cameras(tmp_path):
+    folder = colmap(tmp_path / "in", NAMES[:3], size=(6, 4))
+    scene = open_scene(str(folder), load_settings())
+    assert scene.train.cameras.fx.tolist() == [5.0] * 3
+    assert "images are 6 x 4, the model's cameras 12 x 8" in scene.notes[0]
+    check_present(scene)
+
+
+@pytest.mark.parametrize(
+    ("size", "words"), [((8, 8), "cropped or squeezed"), ((8, 12), "turned on its side"), ((9, 4), "cropped")]
+)
+def test_images_of_another_shape_are_named_before_anything_is_chosen(tmp_path, size, words):
+    folder = colmap(tmp_path / "in", NAMES[:3])
+    picture(folder / "images" / NAMES[1], size)
+    with pytest.raises(UserError, match=rf"{NAMES[1]}' are of 12 x 8 pixels.*{size[0]} x {size[1]}.*{words}"):
+        check_present(open_scene(str(folder), load_settings()))
+
+
+def test_relative_links_move_with_the_capture(tmp_path):
+    folder = colmap(tmp_path / "both" / "in", NAMES[:4])
+    scene = open_scene(str(folder), load_settings())
+    write_subset(scene, {"indices": [2]}, tmp_path / "both" / "out" / "deep", links="relative")
+    (tmp_path / "both").rename(tmp_path / "moved")
+    again = open_scene(str(tmp_path / "moved" / "out" / "deep"), load_settings())
+    assert again.train.paths[0].is_symlink()
+    check_present(again)
 
 
 def test_all_points_of_the_training_views_come_along(data_root, tmp_path):

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from PIL import Image
 
 from tests.conftest import known
@@ -9,8 +11,11 @@ from tests.scenes.test_rgbd import tum
 from tests.scenes.test_transforms import frames, opened, write
 from tests.scenes.test_written import colmap
 from viewbench.common.errors import UserError
+from viewbench.scenes.formats.tum_rgbd import CAMERAS
 from viewbench.scenes.images import load_images
+from viewbench.scenes.lenses import pinholes, undistorting, where, zoom
 from viewbench.scenes.subset import write_scene, write_subset
+from viewbench.scenes.types import Cameras
 
 K = [0.26, -0.95, -0.005, 0.003, 1.16]  # k1, k2, p1, p2, k3, about those of TUM's first camera
 
@@ -37,10 +42,80 @@ def test_every_coefficient_is_taken_out(tmp_path):
     folder = write(tmp_path, frames("a.png"), size=(width, height), fl_x=focal, **head)
     Image.fromarray(np.round(255 * np.nan_to_num(seen)).astype(np.uint8)).save(folder / "a.png")
     images, cameras = load_images(opened(folder).train, np.array([0]), None)
-    wanted = picture((columns - width / 2) / focal, (rows - height / 2) / focal)
     assert cameras.distortion is None
-    error = np.abs(images[0, ..., 0] - wanted)[10:-10, 10:-10]
-    assert error.max() < 0.02
+    assert cameras.fx[0] == cameras.fy[0] > focal, "at the pincushion's own a border is unseen"
+    wanted = picture((columns - width / 2) / cameras.fx[0], (rows - height / 2) / cameras.fy[0])
+    assert np.abs(images[0, ..., 0] - wanted).max() < 0.02, "up to the last pixel of the border"
+
+
+LENS = st.tuples(
+    st.floats(-0.15, 0.3), st.floats(-0.2, 0.2), st.floats(-0.01, 0.01), st.floats(-0.01, 0.01), st.floats(-0.1, 0.1)
+)
+
+
+def camera(lens, focal=1.0, centre=(0.5, 0.5), size=(64, 48)):
+    """A camera with this lens; the focal length in widths, the centre in shares of the picture."""
+    width, height = size
+    values = (focal * width, focal * width, centre[0] * width, centre[1] * height)
+    numbers = [np.array([value]) for value in values]
+    return Cameras(np.eye(4)[None], *numbers, np.array([width]), np.array([height]), np.array([lens]))
+
+
+@settings(deadline=None, max_examples=60)
+@given(lens=LENS, focal=st.floats(0.8, 2.0), across=st.floats(0.4, 0.6), down=st.floats(0.4, 0.6))
+def test_nothing_is_seen_past_the_border_and_no_more_is_lost_than_must_be(lens, focal, across, down):
+    seen = camera(lens, focal, (across, down))
+    factor = zoom(seen)
+    row, column = undistorting(seen)
+    assert row.min() >= 0
+    assert row.max() <= 47
+    assert column.min() >= 0
+    assert column.max() <= 63
+    if factor > 1:
+        v, u = np.mgrid[:48, :64] + 0.5
+        row, column = where(seen, factor - 2 / 1024, u, v)
+        assert min(row.min(), column.min(), 47 - row.max(), 63 - column.max()) < 1e-9, "a smaller one sees past it"
+
+
+@settings(deadline=None, max_examples=20)
+@given(lens=LENS)
+def test_pixels_are_looked_up_where_opencv_looks(lens):
+    """cv2.initUndistortRectifyMap counts from the centre of the first pixel."""
+    cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed")
+    seen = camera(lens)
+    made = pinholes(seen)
+
+    def matrix(c):
+        return np.array([[c.fx[0], 0, c.cx[0] - 0.5], [0, c.fy[0], c.cy[0] - 0.5], [0, 0, 1.0]])
+
+    x, y = cv2.initUndistortRectifyMap(matrix(seen), np.array(lens), None, matrix(made), (64, 48), cv2.CV_32FC1)
+    np.testing.assert_allclose(undistorting(seen), np.stack([y, x]), atol=1e-3)
+
+
+def test_the_border_of_tum_is_not_smeared():
+    """At the focal length of the data set's first camera 6 % of the pixels would be past its border."""
+    fx, fy, cx, cy, *lens = CAMERAS["freiburg1"]
+    numbers = [np.array([value]) for value in (fx, fy, cx + 0.5, cy + 0.5)]
+    seen = Cameras(np.eye(4)[None], *numbers, np.array([640]), np.array([480]), np.array([lens]))
+    v, u = np.mgrid[:480, :640] + 0.5
+    for at, share in ((where(seen, 1.0, u, v), 0.0596), (undistorting(seen), 0.0)):
+        past = (at[0] < 0) | (at[0] > 479) | (at[1] < 0) | (at[1] > 639)
+        assert past.mean() == pytest.approx(share, abs=1e-3)
+    assert zoom(seen) < 1.07
+
+
+def test_a_lens_that_folds_is_refused():
+    with pytest.raises(UserError, match="cannot be taken out"):
+        zoom(camera([-30.0, 0, 0, 0, 0]))
+
+
+def test_cameras_of_several_lenses_have_each_its_own_pinhole():
+    both = [camera([0.2, 0, 0, 0, 0]), camera([0.0, 0, 0, 0, 0]), camera([0.2, 0, 0, 0, 0])]
+    joined = Cameras(*(np.concatenate([vars(one)[name] for one in both]) for name in vars(both[0])))
+    made = pinholes(joined)
+    assert made.distortion is None
+    assert made.fx[0] == made.fx[2] == joined.fx[0] * zoom(both[0])
+    assert made.fx[1] == joined.fx[1]
 
 
 def test_the_data_sets_own_cameras_have_all_their_coefficients(tmp_path):

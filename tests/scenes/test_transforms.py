@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import math
 import shutil
@@ -9,8 +10,12 @@ from PIL import Image
 from tests.conftest import known
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
+from viewbench.common.settings import SceneEntry
+from viewbench.scenes.images import load_images
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.subset import write_subset
+from viewbench.scenes.validate import check_present
+from viewbench.selectors._run import run
 
 SETTINGS = settings_file.load()
 POSE = np.eye(4).tolist()
@@ -77,14 +82,14 @@ def test_a_subset_is_the_same_scene_with_fewer_views(small_room, tmp_path):
     scene = opened(small_room)
     write_subset(scene, {"indices": [5, 2, 9]}, tmp_path / "out")
     again = opened(tmp_path / "out")
-    assert again.train.names == tuple(scene.train.names[i] for i in (5, 2, 9))
+    assert again.train.names == tuple(scene.train.names[i] for i in (2, 5, 9)), "in capture order"
     assert again.test.names == scene.test.names
-    np.testing.assert_array_equal(again.train.cameras.c2w, scene.train.cameras.c2w[[5, 2, 9]])
-    np.testing.assert_array_equal(again.train.times, known(scene.train.times)[[5, 2, 9]])
+    np.testing.assert_array_equal(again.train.cameras.c2w, scene.train.cameras.c2w[[2, 5, 9]])
+    np.testing.assert_array_equal(again.train.times, known(scene.train.times)[[2, 5, 9]])
     np.testing.assert_allclose(known(again.points).xyz, known(scene.points).xyz, atol=1e-5)
     assert (tmp_path / "out" / "selection.json").is_file()
     assert all(path.is_symlink() for path in again.train.paths)
-    write_subset(scene, {"indices": [1]}, tmp_path / "copied", copy=True)
+    write_subset(scene, {"indices": [1]}, tmp_path / "copied", links="copy")
     assert not any(path.is_symlink() for path in (tmp_path / "copied").rglob("*"))
 
 
@@ -117,7 +122,7 @@ def test_nerfstudio_lists_make_the_test_split_and_are_written_again(tmp_path):
     assert (scene.train.names, scene.test.names) == (("a.png", "c.png", "d.png"), ("b.png",))
     write_subset(scene, {"indices": [2, 0]}, tmp_path / "out")
     table = json.loads((tmp_path / "out" / "transforms.json").read_text())
-    assert table["train_filenames"] == ["d.png", "a.png"]
+    assert table["train_filenames"] == ["a.png", "d.png"]
     assert table["val_filenames"] == table["test_filenames"] == ["b.png"]
     assert table["applied_transform"] == [[1]]
     assert opened(tmp_path / "out").test.names == ("b.png",)
@@ -150,11 +155,50 @@ def test_images_outside_the_folder_only_when_asked(tmp_path):
     assert all(path.is_file() for path in again.train.paths)
 
 
-def test_frames_of_two_sizes_are_refused(tmp_path):
-    listed = frames("a.png", "b.png")
+def test_frames_of_two_sizes_are_chosen_from_and_not_trained_on(tmp_path):
+    listed = frames("a.png", "b.png", "c.png")
     listed[1] |= {"w": 16, "h": 12}
-    with pytest.raises(UserError, match=r"b\.png.*16 x 12"):
-        opened(write(tmp_path, listed, fl_x=5))
+    folder = write(tmp_path / "in", listed, fl_x=5)
+    Image.new("RGB", (16, 12)).save(folder / "b.png")
+    scene = opened(folder)
+    check_present(scene)
+    record = run(scene, "maxmin", 2, 0, {"factors": ["pos", "ang"]})
+    write_subset(scene, record, tmp_path / "out")
+    assert len(opened(tmp_path / "out").train) == 2
+    with pytest.raises(UserError, match="different sizes"):
+        load_images(scene.train, np.arange(3), None)
+
+
+def test_a_scene_of_the_settings_may_reach_outside_its_folder(tmp_path):
+    (tmp_path / "in").mkdir()
+    for name in ("a.png", "b.png"):
+        Image.new("RGB", (8, 6)).save(tmp_path / name)
+    folder = write(tmp_path / "in", frames("../a.png", "../b.png"), fl_x=5)
+    entry = {"mine": SceneEntry(path=str(folder), allow_outside=True)}
+    settings = dataclasses.replace(SETTINGS, scenes=entry)
+    assert len(open_scene("mine", settings).train) == 2
+    with pytest.raises(UserError, match="allow_outside = true"):
+        opened(folder)
+
+
+def test_hints_do_not_tell_what_was_just_done(tmp_path):
+    folder = write(tmp_path / "in", frames("a.png", "b.png", "c.png", "d.png"), fl_x=5)
+    for name in ("test", "train"):
+        (folder / f"transforms_{name}.json").write_text((folder / "transforms.json").read_text())
+    (folder / "transforms.json").rename(folder / "spare.json")
+    (folder / "transforms_test.json").write_text(json.dumps({"fl_x": 5, "frames": frames("t.png")}))
+    Image.new("RGB", (8, 6)).save(folder / "t.png")
+    with pytest.raises(UserError, match="leave --holdout out"):
+        opened(folder, holdout="every:2")
+    entry = {"mine": SceneEntry(path=str(folder), holdout="every:2")}
+    with pytest.raises(UserError, match=r"take `holdout` out of \[scenes\.mine\]") as error:
+        open_scene("mine", dataclasses.replace(SETTINGS, scenes=entry))
+    assert "--holdout" not in str(error.value)
+    table = {"frames": frames("a\0.png"), "fl_x": 5}
+    (folder / "transforms_train.json").write_text(json.dumps(table))
+    with pytest.raises(UserError, match="no name of a file") as error:
+        opened(folder, allow_outside=True)
+    assert "--allow-outside" not in str(error.value)
 
 
 SKEWED = [[1, 0.1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]

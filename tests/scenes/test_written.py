@@ -50,7 +50,7 @@ def test_masks_and_depths_come_along(tmp_path, copy):
         picture(tmp_path / "in" / frame["depth_file_path"])
     picture(tmp_path / "in" / "masks" / "all.png")
     scene = opened(write(tmp_path / "in", listed, fl_x=5))
-    write_subset(scene, {"indices": [2, 0]}, tmp_path / "out", copy=copy)
+    write_subset(scene, {"indices": [2, 0]}, tmp_path / "out", links="copy" if copy else "absolute")
     assert files(tmp_path / "out") == [
         "a.png",
         "c.png",
@@ -177,7 +177,7 @@ def test_two_images_of_one_name_are_not_mixed_up(tmp_path):
 
 def test_frames_may_share_an_image(tmp_path):
     scene = opened(write(tmp_path / "in", frames("a.png", "./a.png"), fl_x=5))
-    write_subset(scene, {"indices": [0, 1]}, tmp_path / "out", copy=True)
+    write_subset(scene, {"indices": [0, 1]}, tmp_path / "out", links="copy")
     assert len(opened(tmp_path / "out").train) == 2
 
 

@@ -30,6 +30,13 @@ threads_option = click.option(
 )
 
 
+def links_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options --copy and --relative, of how images come into what is written."""
+    copied = click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
+    related = click.option("--relative", is_flag=True, help="Link by relative paths, to move with the capture.")
+    return copied(related(command))
+
+
 def with_threads(settings: "Settings", threads: int | None) -> "Settings":
     """The settings, with so many threads for this command where any are named."""
     return settings if threads is None else replace(settings, compute=replace(settings.compute, threads=threads))
@@ -43,12 +50,14 @@ class Capture:
     format: str | None
     holdout: str | None
     allow_outside: bool
+    model: int | None = None
 
     def open(self, settings: "Settings", notes: bool = True) -> "Scene":
         """The scene; what its reader dropped or assumed is said on stderr unless `notes` is False."""
         from ...scenes.load import open_scene
 
-        options = {"format": self.format, "holdout": self.holdout, "allow_outside": self.allow_outside}
+        options = {"format": self.format, "holdout": self.holdout, "model": self.model}
+        options["allow_outside"] = self.allow_outside
         scene = open_scene(self.name, settings, **options)
         for note in scene.notes if notes else ():
             print(f"viewbench: {scene.name}: {note}", file=sys.stderr)
@@ -60,6 +69,12 @@ SCENE = (
     click.option("--format", "format_", metavar="NAME", help="Force a reader (viewbench list formats)."),
     click.option("--holdout", metavar="RULE", help="Test split where the capture has none: every:8, blocks:8 or none."),
     click.option("--allow-outside", is_flag=True, help="Let transforms name images outside the folder."),
+    click.option(
+        "--model",
+        "number",
+        type=click.IntRange(min=0),
+        help="Number of one of several COLMAP models; else the largest.",
+    ),
 )
 
 
@@ -67,8 +82,10 @@ def scene_options(command: Callable[..., None]) -> Callable[..., None]:
     """Argument SCENE and what goes with it, handed to the command as one `Capture` called `scene`."""
 
     @functools.wraps(command)
-    def wrapped(scene: str, format_: str | None, holdout: str | None, allow_outside: bool, **given: Any) -> None:
-        command(scene=Capture(scene, format_, holdout, allow_outside), **given)
+    def wrapped(
+        scene: str, format_: str | None, holdout: str | None, allow_outside: bool, number: int | None, **given: Any
+    ) -> None:
+        command(scene=Capture(scene, format_, holdout, allow_outside, number), **given)
 
     for option in reversed(SCENE):
         wrapped = option(wrapped)

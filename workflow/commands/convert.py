@@ -10,7 +10,7 @@ from . import _options
 @click.command()
 @_options.out_option
 @click.option("--to", required=True, metavar="FORMAT", help="Format to write: transforms or colmap.")
-@click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
+@_options.links_options
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
 @_options.scene_options
 def command(
@@ -18,6 +18,7 @@ def command(
     out: Path,
     to: str,
     copy: bool,
+    relative: bool,
     force: bool,
 ) -> None:
     """Write all views of SCENE to --out in the format --to."""
@@ -27,7 +28,9 @@ def command(
     from ...scenes.subset import write_scene
 
     opened = scene.open(settings_file.load())
-    write_scene(opened, np.arange(len(opened.train)), out, to, copy, force)
+    links = "copy" if copy else "relative" if relative else "absolute"
+    for note in write_scene(opened, np.arange(len(opened.train)), out, to, links, force):
+        click.echo(f"viewbench: {note}", err=True)
     if to == "colmap" and opened.points is None:
         click.echo("viewbench: the scene has no points; nerfstudio's and gsplat's COLMAP readers want some", err=True)
     click.echo(f"{len(opened.train)} training and {len(opened.test)} test views in {out}")
