@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from . import _options
+from . import _choice_options, _options
 
 
 @click.command()
@@ -15,15 +15,8 @@ from . import _options
 @click.option("--count", type=int, help="Number of views, instead of --ratio.")
 @_options.count_rule_option
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the choice.")
-@click.option("--alpha", type=float, help="Weight of the position factor; 0.7.")
-@click.option("--beta", type=float, help="Weight of the rotation factor; 0.2. The semantic one gets the rest.")
-@click.option("--sigma", type=float, help="Width of the position factor, positions scaled to [-4, 4]; 0.5.")
-@click.option("--factors", help="Factors to use, of pos,ang,sem.")
-@click.option("--start", type=click.Choice(["random", "medoid"]), help="First view of maxmin and kcenter.")
+@_choice_options.comparison_options
 @click.option("--sample", is_flag=True, help="Draw logdet's views from the k-DPP instead of maximising.")
-@click.option("--sharpness", type=float, metavar="W", help="How much blurred frames lose; 0 ignores blur.")
-@click.option("--features", type=click.Path(path_type=Path), help="Your own N x D features (.npy).")
-@_options.encoder_option
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
 @click.option("--dry-run", is_flag=True, help="Choose and print, write nothing.")
 @click.option("--selection", type=click.Path(path_type=Path), help="Write only selection.json, to this file.")
@@ -55,17 +48,13 @@ def command(**given: Any) -> None:
     check_present(scene)
     n = len(scene.train)
     count = given["count"] if given["ratio"] is None else count_of(given["ratio"], n, given["count_rule"])
-    parameters = _options.settings_of(given["options"])
-    named = ("alpha", "beta", "sigma", "start", "sharpness")
-    parameters |= {key: given[key] for key in named if given[key] is not None}
+    parameters = _options.settings_of(given["options"]) | _choice_options.parameters_of(given)
     if given["sample"]:
         parameters["sample"] = True
-    if given["factors"] is not None:
-        parameters["factors"] = [part.strip() for part in given["factors"].split(",") if part.strip()]
     if isinstance(parameters.get("factors"), str):
         parameters["factors"] = [parameters["factors"]]
-    features = _features(scene, given, parameters, settings)
-    sharp = _sharpness(scene, settings) if parameters.get("sharpness") else None
+    features = _choice_options.features_of(scene, given["selector"], given, parameters, settings)
+    sharp = _choice_options.sharpness_of(scene, settings) if parameters.get("sharpness") else None
     record = _run.run(scene, given["selector"], count, given["seed"], parameters, features, sharp)
     for name, note in record.get("notes", {}).items():
         click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
@@ -89,30 +78,3 @@ def command(**given: Any) -> None:
     if given["dry_run"] or not given["selection"]:
         for name in record["names"]:
             click.echo(name)
-
-
-def _features(scene: Any, given: dict[str, Any], parameters: dict[str, Any], settings: Any) -> Any:
-    """The features that the selector needs: the user's own, the cached ones, or None without the semantic factor."""
-    from ...common import plugins
-
-    if given["features"] is not None:
-        from ...scenes.features import load_user_features
-
-        return load_user_features(given["features"], len(scene.train))
-    plugins.load("selectors", given["selector"])
-    factors = parameters.get("factors", plugins.constant("selectors", given["selector"], "FACTORS", ()))
-    encoder = given["encoder"] or settings.features.encoder
-    if "sem" not in tuple(factors) or encoder == "none":
-        return None
-    from ...scenes.features import features
-
-    cache = Path(settings.features.cache)
-    progress = _options.progress("features")
-    return features(scene.train, encoder, cache, settings.features.batch, progress, settings.compute.device)
-
-
-def _sharpness(scene: Any, settings: Any) -> Any:
-    """How sharp each training image is, measured once and kept."""
-    from ...scenes.sharpness import sharpness
-
-    return sharpness(scene.train, Path(settings.features.cache), _options.progress("sharpness"))
