@@ -1,9 +1,11 @@
 """Runs one selector on a scene: checks what was asked, prepares the views, times the choice, makes `selection.json`."""
 
+import functools
 import hashlib
 import math
 import time
 from collections.abc import Sequence
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -35,37 +37,41 @@ def modules_of(selector: str) -> tuple[str, str]:
 def run(
     scene: Scene,
     selector: str,
-    count: int,
+    count: int | None,
     seed: int,
     parameters: dict[str, Any] | None = None,
     features: np.ndarray | None = None,
     sharpness: np.ndarray | None = None,
+    within: float | None = None,
 ) -> dict[str, Any]:
     """Chooses `count` training views and returns what `selection.json` holds.
 
     `features` (N, D) and `sharpness` (N,) have a row per training view in capture order. The random generator is
     seeded by scene, selector and seed but not by the count, so that greedy orders are prefixes of each other over
-    ratios. Test views are not looked at.
+    ratios. Test views are not looked at. With `within` instead of a count, that is the smallest count of a greedy order
+    whose uncovered distance is no larger (`_covering`), and `auto` in the notes says both.
 
-    Raises UserError for an unknown selector or parameter (with the nearest right one), a parameter of a wrong type, a
-    count outside [1, N], and features or sharpness of a wrong length or with NaN.
+    Raises UserError as `checked` does, and for features or sharpness of a wrong length or with NaN.
     """
     n = len(scene.train)
-    if n == 0:
-        raise UserError(f"scene '{scene.name}' has no training views to choose from")
-    if not 1 <= count <= n:
-        raise UserError(f"count {count} must lie in [1, {n}]: scene '{scene.name}' has {n} training views")
-    plugin = plugins.load("selectors", selector)
+    plugin, options = checked(scene, selector, count, parameters, within)
     selector = selector.replace("_", "-")
-    options = all_parameters(selector, plugin.PARAMETERS, parameters or {})
     if not scene.posed:
         options = _without_poses(scene, selector, options, features)
     if options.get("sharpness") and sharpness is None:
         raise UserError(f"'{selector}' was asked to weigh sharpness, but the sharpness of the frames was not given")
     code = code_of(selector, scene.format)  # as it is when it is loaded
-    views = _views(scene.train, features, sharpness)
+    views = views_of(scene.train, features, sharpness)
     begin = time.perf_counter()
-    choice = plugin.select(views, count, generator("select", scene.name, selector, seed), **options)
+    notes: dict[str, Any] = {}
+    if within is None:
+        choice = plugin.select(views, count, generator("select", scene.name, selector, seed), **options)
+    else:
+        from . import _covering  # no source: the order is the selector's, this says how much of it is enough
+
+        again = functools.partial(generator, "select", scene.name, selector, seed)
+        choice, reached = _covering.enough(plugin, views, within, again, options)
+        notes = {"auto": {"distance": within, "reached": reached}}
     elapsed = time.perf_counter() - begin
     similarity_s = choice.seconds.get("similarity", 0.0)
     indices = [int(i) for i in choice.indices]
@@ -78,7 +84,7 @@ def run(
         "parameters": options,
         "seed": seed,
         "n_views": n,
-        "count": count,
+        "count": len(indices),
         "indices": indices,
         "names": [scene.train.names[i] for i in indices],
         "gains": None if choice.gains is None else [float(gain) for gain in choice.gains],
@@ -91,7 +97,41 @@ def run(
         "greedy": is_greedy(selector, options),
         "viewbench": __version__,
     }
-    return record | ({"notes": dict(choice.notes)} if choice.notes else {})
+    notes |= choice.notes
+    return record | ({"notes": notes} if notes else {})
+
+
+def checked(
+    scene: Scene,
+    selector: str,
+    count: int | None,
+    parameters: dict[str, Any] | None = None,
+    within: float | None = None,
+) -> tuple[ModuleType, dict[str, Any]]:
+    """The selector and all its parameters, as far as they can be checked before any feature is computed.
+
+    Raises UserError for an unknown selector or parameter (with the nearest right one), a parameter of a wrong type,
+    weights that are none, a count outside [1, N], and a distance `within` that it cannot choose by.
+    """
+    n = len(scene.train)
+    if n == 0:
+        raise UserError(f"scene '{scene.name}' has no training views to choose from")
+    if (count is None) == (within is None):
+        raise UserError("a choice takes either a count or a distance")
+    if count is not None and not 1 <= count <= n:
+        raise UserError(f"count {count} must lie in [1, {n}]: scene '{scene.name}' has {n} training views")
+    plugin = plugins.load("selectors", selector)
+    options = all_parameters(selector.replace("_", "-"), plugin.PARAMETERS, parameters or {})
+    weights = {key: options[key] for key in ("alpha", "beta", "sigma", "factors") if key in options}
+    if weights:
+        from ._similarity import check_weights  # no source: the selector that has weights checks them again
+
+        check_weights(**weights)
+    if within is not None:
+        from . import _covering  # no source: as above
+
+        _covering.check(selector, options, within)
+    return plugin, options
 
 
 def _without_poses(scene: Scene, selector: str, options: dict[str, Any], features: np.ndarray | None) -> dict[str, Any]:
@@ -111,7 +151,7 @@ def _without_poses(scene: Scene, selector: str, options: dict[str, Any], feature
     return options | {"factors": ["sem"]}
 
 
-def _views(train: Split, features: np.ndarray | None, sharpness: np.ndarray | None) -> Views:
+def views_of(train: Split, features: np.ndarray | None, sharpness: np.ndarray | None) -> Views:
     cameras = train.cameras
     bad = np.flatnonzero(~np.isfinite(cameras.c2w).all(axis=(1, 2)))
     if len(bad):
