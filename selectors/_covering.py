@@ -22,6 +22,10 @@ from ._types import FACTORS, Choice, Views
 GROWTH = 1.5  # of the count, where a selector cannot stop by itself
 
 
+class NotEnoughError(UserError):
+    """Nothing short of all views is within the distance."""
+
+
 def similarity_of(views: Views, parameters: Mapping[str, Any]) -> Similarity:
     """M by the weights and factors among the parameters of a selector; the paper's where it has none."""
     named = {key: parameters[key] for key in ("alpha", "beta", "sigma") if key in parameters}
@@ -80,7 +84,7 @@ def enough(
     `within` stops by itself, another is asked for so many views as `maxmin` needs, then for half as many more, again
     and again.
 
-    Raises UserError where nothing short of all views is enough.
+    Raises NotEnoughError where nothing short of all views is enough.
     """
     n = len(views)
     if "within" in inspect.signature(plugin.select).parameters:
@@ -93,11 +97,31 @@ def enough(
         choice = plugin.select(views, count, rng(), **parameters)
     if len(choice.indices) == n:
         least = uncovered(similarity_of(views, parameters), choice.indices[:-1])[-1] if n > 1 else 0.0
-        raise UserError(
+        raise NotEnoughError(
             f"no choice short of all {n} views is within {within:g}: without the last of them a view is {least:.3g} "
             "away; give --auto a larger distance than that, or --count"
         )
     return choice, float(reached)
+
+
+def order_within(
+    scene: Scene,
+    within: float,
+    seed: int,
+    parameters: dict[str, Any],
+    features: np.ndarray | None,
+    sharpness: np.ndarray | None = None,
+) -> tuple[dict[str, Any], np.ndarray, Similarity]:
+    """The order of `maxmin` until D ≤ `within`, all of it where nothing less is enough, as a record; its curve of D
+    and the similarity that it is by. Raises UserError as `_run.run` does."""
+    try:
+        record = _run.run(scene, "maxmin", None, seed, parameters, features, sharpness, within=within)
+    except NotEnoughError:
+        record = _run.run(scene, "maxmin", len(scene.train), seed, parameters, features, sharpness)
+    record.get("notes", {}).pop("auto", None)
+    similar = compared(scene, record["parameters"], features)
+    assert similar is not None  # else the run had refused
+    return record, uncovered(similar, record["indices"]), similar
 
 
 def _search(

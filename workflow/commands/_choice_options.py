@@ -1,11 +1,13 @@
 """Options that say how views are compared, which several commands share, and what those options stand for."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
+from ...common.errors import UserError, nearest
 from . import _options
 
 COMPARISON = (
@@ -61,3 +63,27 @@ def sharpness_of(scene: Any, settings: Any) -> Any:
     from ...scenes.sharpness import sharpness
 
     return sharpness(scene.train, Path(settings.features.cache), _options.progress("sharpness"))
+
+
+def check_file(option: str, path: Path | None, kinds: tuple[str, ...] = ()) -> None:
+    """Raises UserError for a file that cannot be written there, before the work that would fill it: another ending
+    than one of `kinds`, a folder of that name, a folder above it that is none or is read-only."""
+    if path is None:
+        return
+    if kinds and path.suffix.lower() not in kinds:
+        hint = nearest(path.suffix.lower(), kinds)
+        raise UserError(f"{option} '{path}': expected a file ending in {' or '.join(kinds)}{hint}")
+    if path.is_dir():
+        raise UserError(f"{option} '{path}' is a folder; name a file in it")
+    check_folder(option, path.absolute().parent)
+
+
+def check_folder(option: str, folder: Path) -> None:
+    """Raises UserError for a folder that can neither be written to nor be made."""
+    there = folder.absolute()
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    if not there.is_dir():
+        raise UserError(f"{option}: '{there}' is a file, so nothing can be written below it; name another place")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise UserError(f"{option}: folder '{there}' cannot be written to; name another place")
