@@ -21,13 +21,18 @@ def write_subset(scene: Scene, selection: dict[str, Any], out: Path, copy: bool 
     folder appears only when all of it is written. Raises UserError for an image that is missing or cut short, and for
     a folder that exists and is not empty unless `force` replaces it.
     """
-    written = scene.format if writable(plugins.load("scenes.formats", scene.format)) else "transforms"
+    written = written_format(scene)
     indices = np.asarray(selection["indices"], dtype=np.int64)
     if scene.format != "video":
         for path in (*scene.train.subset(indices).paths, *scene.test.paths):
             check_whole(path)
     write_scene(scene, indices, out, written, copy, force, selection)
     return written
+
+
+def written_format(scene: Scene) -> str:
+    """The format that a subset of the scene is written in."""
+    return scene.format if writable(plugins.load("scenes.formats", scene.format)) else "transforms"
 
 
 def write_scene(
@@ -40,6 +45,16 @@ def write_scene(
     selection: dict[str, Any] | None = None,
 ) -> None:
     """Writes the training views at `indices` and the test split in the format `format_name`; as `write_subset`."""
+    check_target(scene, out, format_name, force)
+    module = plugins.load("scenes.formats", format_name)
+    with whole_folder(out) as temporary:
+        module.write(scene, indices, temporary, copy)
+        if selection is not None:
+            write_json(temporary / "selection.json", sealed({**selection, "holdout": scene.holdout}))
+
+
+def check_target(scene: Scene, out: Path, format_name: str, force: bool) -> None:
+    """Raises UserError where the scene cannot be written to the folder `out` in the format `format_name`."""
     module = plugins.load("scenes.formats", format_name)
     if not writable(module):
         raise UserError(
@@ -58,10 +73,6 @@ def write_scene(
         raise UserError(f"'{out}' exists and is not empty; name another folder or give --force")
     if out.resolve() == scene.root.resolve() or scene.root.resolve().is_relative_to(out.resolve()):
         raise UserError(f"'{out}' holds the capture itself; name another folder")
-    with whole_folder(out) as temporary:
-        module.write(scene, indices, temporary, copy)
-        if selection is not None:
-            write_json(temporary / "selection.json", sealed({**selection, "holdout": scene.holdout}))
 
 
 def writable(module: Any) -> bool:

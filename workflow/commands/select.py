@@ -8,11 +8,12 @@ import click
 from . import _choice_options, _options
 
 
-@click.command()
+@click.command(cls=_choice_options.AutoCommand)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to write the chosen subset to.")
 @click.option("--selector", default="maxmin", show_default=True, help="Way of choosing (viewbench list selectors).")
 @click.option("--ratio", type=float, help="Share of the training views, in (0, 1].")
 @click.option("--count", type=int, help="Number of views, instead of --ratio.")
+@_choice_options.auto_option
 @_options.count_rule_option
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the choice.")
 @_choice_options.comparison_options
@@ -21,31 +22,32 @@ from . import _choice_options, _options
 @click.option("--dry-run", is_flag=True, help="Choose and print, write nothing.")
 @click.option("--selection", type=click.Path(path_type=Path), help="Write only selection.json, to this file.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the choice: .png, .pdf, .svg or .html (3D).")
+@click.option("--sheet", type=click.Path(path_type=Path), help="Thumbnails of the choice: .jpg, .png, .webp or .html.")
 @click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
 @_options.scene_options
 def command(**given: Any) -> None:
-    """Choose views of SCENE and write them to --out, in the format that was read, with selection.json."""
-    import numpy as np
+    """Choose views of SCENE and write them to --out, in the format that was read, with selection.json.
 
+    How many: a share (--ratio), a number (--count), or as many as it takes (--auto), which `viewbench redundancy SCENE`
+    shows beforehand. --plot and --sheet show what was chosen.
+    """
     from ...common import settings as settings_file
     from ...common.errors import UserError
     from ...common.files import sealed, write_json
+    from ...scenes.subset import check_target, write_subset, written_format  # no source: it writes what was chosen
     from ...scenes.validate import check_present
     from ...selectors import _run
     from ...selectors._selection import count_of
 
-    if (given["ratio"] is None) == (given["count"] is None):
-        raise UserError("give either --ratio or --count")
+    if sum(given[key] is not None for key in ("ratio", "count", "auto")) != 1:
+        raise UserError("give either --ratio or --count, or --auto to have the count found")
     if not (given["out"] or given["selection"] or given["dry_run"]):
         raise UserError("give --out FOLDER, or --dry-run to see the choice without writing it")
-    if given["plot"]:
-        from ...reports._selection_plot import kind_of, plot  # no source: it draws what was chosen
-
-        kind_of(given["plot"])
+    writes = given["out"] and not given["dry_run"]
+    _check_files(given)
     settings = settings_file.load()
     scene = given["scene"].open(settings)
-    check_present(scene)
     n = len(scene.train)
     count = given["count"] if given["ratio"] is None else count_of(given["ratio"], n, given["count_rule"])
     parameters = _options.settings_of(given["options"]) | _choice_options.parameters_of(given)
@@ -53,28 +55,74 @@ def command(**given: Any) -> None:
         parameters["sample"] = True
     if isinstance(parameters.get("factors"), str):
         parameters["factors"] = [parameters["factors"]]
+    _run.checked(scene, given["selector"], count, parameters, given["auto"])
+    if writes:
+        check_target(scene, given["out"], written_format(scene), given["force"])
+    check_present(scene)
     features = _choice_options.features_of(scene, given["selector"], given, parameters, settings)
     sharp = _choice_options.sharpness_of(scene, settings) if parameters.get("sharpness") else None
-    record = _run.run(scene, given["selector"], count, given["seed"], parameters, features, sharp)
+    record = _run.run(scene, given["selector"], count, given["seed"], parameters, features, sharp, given["auto"])
+    count = record["count"]
     for name, note in record.get("notes", {}).items():
-        click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
+        if name != "auto":
+            click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
+    if given["auto"] is not None:
+        reached = record["notes"]["auto"]["reached"]
+        words = f"every view left out is within {given['auto']:g} of a chosen one (the farthest {reached:.4f})"
+        click.echo(f"viewbench: {count:,} of {n:,} views: {words}", err=True)
     if given["selection"]:
         write_json(given["selection"], sealed(record))
-    if given["out"] and not given["dry_run"]:
-        from ...scenes.subset import write_subset  # no source: it writes what was chosen
-
+    if writes:
         written = write_subset(scene, record, given["out"], copy=given["copy"], force=given["force"])
         if written != scene.format:
             click.echo(f"viewbench: format {scene.format} is only read; the subset is written as {written}", err=True)
         if (given["out"] / "transforms_test.json").is_file():
             hint = "the 3DGS authors' train.py trains on transforms_test.json too unless it is given --eval"
             click.echo(f"viewbench: {hint}", err=True)
-    if given["plot"]:
-        title = f"{scene.name}: {count} of {n} views by {given['selector']}"
-        cameras = scene.train.cameras
-        plot(given["plot"], title, cameras.positions, cameras.forward, np.asarray(record["indices"]))
-    if given["out"] and not given["dry_run"]:
+    if given["plot"] or given["sheet"]:
+        from ...selectors._covering import compared  # no source: it looks at what was chosen
+
+        if features is None and not scene.posed:
+            features = _choice_options.features_of(scene, "maxmin", given, {}, settings)
+        similar = compared(scene, record["parameters"], features)
+        _draw(given, scene, record, similar)
+    if writes:
         click.echo(f"viewbench: {count} of {n} views are in {given['out']}, in the order chosen:", err=True)
     if given["dry_run"] or not given["selection"]:
         for name in record["names"]:
             click.echo(name)
+
+
+def _check_files(given: dict[str, Any]) -> None:
+    """Raises UserError for what cannot be written, before anything is computed that would be."""
+    if given["plot"]:
+        from ...reports._selection_plot import kind_of  # no source: it draws what was chosen
+
+        kind_of(given["plot"])
+    if given["sheet"]:
+        from ...reports import _contact_sheet  # no source: likewise
+
+        _contact_sheet.kind_of(given["sheet"])
+    for option in ("plot", "sheet", "selection"):
+        _choice_options.check_file(f"--{option}", given[option])
+    if given["out"] and not given["dry_run"]:
+        _choice_options.check_folder("--out", given["out"].absolute().parent)
+
+
+def _draw(given: dict[str, Any], scene: Any, record: dict[str, Any], similar: Any) -> None:
+    """Draws what --plot and --sheet ask for."""
+    import numpy as np
+
+    from ...reports._picked import picked  # no source: it draws what was chosen
+
+    title = f"{scene.name}: {record['count']:,} of {record['n_views']:,} views by {record['selector']}"
+    choice = picked(scene, title, np.asarray(record["indices"]), similar, given["auto"])
+    if given["plot"]:
+        from ...reports._selection_plot import plot  # no source: likewise
+
+        plot(given["plot"], choice)
+    if given["sheet"]:
+        from ...reports import _contact_sheet  # no source: likewise
+
+        for line in _contact_sheet.draw(given["sheet"], choice, _options.progress("sheet")):
+            click.echo(f"viewbench: {line}", err=True)
