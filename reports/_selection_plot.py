@@ -48,7 +48,7 @@ def _still(path: Path, picked: Picked) -> None:
     from ._figures import look
 
     with look():
-        height = 6.5 + STRIP if picked.posed else 1.0 + STRIP
+        height = 6.5 + STRIP if picked.posed else STRIP if picked.distance is None else 1.0 + STRIP
         figure = Figure(figsize=(6.5 if picked.posed else 9.0, height), layout="constrained")
         rows = figure.add_gridspec(2, 1, height_ratios=(6.5, STRIP)) if picked.posed else figure.add_gridspec(1, 1)
         places = [figure.add_subplot(row) for row in rows]
@@ -57,7 +57,8 @@ def _still(path: Path, picked: Picked) -> None:
         draw_strip(places[-1], picked)
         places[0].set_title(picked.title)
         if not picked.posed:
-            words = f"{len(picked.chosen):,} chosen of {len(picked.frames):,} frames, compared by {picked.factors}"
+            by = "" if picked.distance is None else f", compared by {picked.factors}"
+            words = f"{len(picked.chosen):,} chosen of {len(picked.frames):,} frames{by}"
             figure.supxlabel(words, fontsize=8)
         else:
             figure.legend(loc="outside lower center", ncols=2)
@@ -105,7 +106,7 @@ def _interactive(path: Path, picked: Picked) -> None:
     else:
         figure = go.Figure(strip_traces(picked))
     figure.update_xaxes(title=picked.unit)
-    figure.update_yaxes(title=Y.replace("\n", "<br>"))
+    figure.update_yaxes(title=Y.replace("\n", "<br>"), visible=picked.distance is not None)
     figure.update_layout(title=picked.title, template="plotly_white", margin={"l": 60, "r": 10, "b": 40})
     figure.write_html(path, include_plotlyjs=True, default_height="95vh")
 

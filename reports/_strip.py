@@ -14,16 +14,17 @@ Y = "distance to the\nnearest chosen"
 def draw_strip(axes: Any, picked: Picked) -> None:
     """Draws it on matplotlib axes: the curve grey, a mark for each chosen frame below it, the distance asked for."""
     clock = picked.clock
-    if picked.distance is not None:
+    top = 1.0
+    if picked.distance is None:
+        axes.set_ylim(-0.12, 0)
+        axes.set_yticks([])
+        axes.spines["left"].set_visible(False)
+    else:
         axes.fill_between(clock, picked.distance, color=GREY, alpha=0.35, linewidth=0)
         axes.plot(clock, picked.distance, color=GREY, linewidth=0.8)
         top = max(float(picked.distance.max()), picked.within or 0.0) or 1.0
         axes.set_ylim(-0.12 * top, 1.08 * top)
         axes.set_ylabel(Y)
-    else:
-        top = 1.0
-        axes.set_ylim(-0.12, 0.12)
-        axes.set_yticks([])
     if picked.within is not None:
         axes.axhline(picked.within, color=CHOSEN, linewidth=0.8, linestyle=(0, (4, 2)))
     marks = clock[picked.chosen]
@@ -44,11 +45,13 @@ def strip_traces(picked: Picked) -> list[Any]:
             f"{name}: chosen as number {ranks[i]}" if i in ranks else f"{name}: {left:.3f} from {names[owner]}"
             for i, (name, left, owner) in enumerate(zip(names, picked.distance, picked.owner, strict=True))
         ]
-        line = {"color": GREY, "width": 1}
+        look = {"fill": "tozeroy", "line": {"color": GREY, "width": 1}, "name": "distance"}
         x, y = clock.tolist(), picked.distance.tolist()
-        traces.append(
-            go.Scatter(x=x, y=y, fill="tozeroy", line=line, hovertext=words, hoverinfo="text", name="distance")
-        )
+        traces.append(go.Scatter(x=x, y=y, hovertext=words, hoverinfo="text", **look))
+    if picked.within is not None:
+        line = {"color": CHOSEN, "width": 1, "dash": "dash"}
+        ends = [float(clock[0]), float(clock[-1])]
+        traces.append(go.Scatter(x=ends, y=[picked.within] * 2, mode="lines", line=line, name="--auto"))
     marks = clock[picked.chosen].tolist()
     words = [f"{names[i]}: chosen as number {rank}" for i, rank in ranks.items()]
     marker = {"symbol": "line-ns", "size": 9, "line": {"color": CHOSEN, "width": 1.5}}
