@@ -9,7 +9,7 @@ Tools find these by folder and name, so that a subset has them under the same on
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from .image_files import is_file, leaves
@@ -42,7 +42,7 @@ def beside(root: Path, names: Sequence[str]) -> list[tuple[Path, str]]:
     return found
 
 
-def smaller(root: Path, listed: dict[str, Sequence[str]]) -> tuple[list[tuple[Path, str]], list[str]]:
+def smaller(root: Path, listed: Mapping[str, Sequence[str]]) -> tuple[list[tuple[Path, str]], list[str]]:
     """Smaller copies of the files of transforms.json, and their place; and a note where they are left out.
 
     `listed` has the paths of "images", "masks" and "depths" as transforms.json names them. Nerfstudio takes

@@ -32,12 +32,17 @@ def write_subset(
     the capture), or copied. The folder appears only when all of it is written. Raises UserError for an image that is
     missing or cut short, and for a folder that exists and is not empty unless `force` replaces it.
     """
-    written = scene.format if writable(plugins.load("scenes.formats", scene.format)) else "transforms"
+    written = written_format(scene)
     indices = np.sort(np.asarray(selection["indices"], dtype=np.int64))
     if scene.format != "video":
         for path in (*scene.train.subset(indices).paths, *scene.test.paths):
             check_whole(path)
     return written, write_scene(scene, indices, out, written, links, force, selection)
+
+
+def written_format(scene: Scene) -> str:
+    """The format that a subset of the scene is written in."""
+    return scene.format if writable(plugins.load("scenes.formats", scene.format)) else "transforms"
 
 
 def write_scene(
@@ -50,9 +55,22 @@ def write_scene(
     selection: dict[str, Any] | None = None,
 ) -> list[str]:
     """Writes the training views at `indices`, in that order, and the test split in a format; as `write_subset`."""
-    module = plugins.load("scenes.formats", format_name)
+    check_target(scene, out, format_name, force)
     if links not in LINKS:
         raise UserError(f"unknown kind of links '{links}' (there are: {', '.join(LINKS)})")
+    module = plugins.load("scenes.formats", format_name)
+    with whole_folder(out) as temporary:
+        notes = module.write(scene, indices, temporary, links == "copy") or []
+        if links == "relative":
+            _relate(temporary)
+        if selection is not None:
+            write_json(temporary / "selection.json", sealed({**selection, "holdout": scene.holdout}))
+    return list(notes)
+
+
+def check_target(scene: Scene, out: Path, format_name: str, force: bool) -> None:
+    """Raises UserError where the scene cannot be written to the folder `out` in the format `format_name`."""
+    module = plugins.load("scenes.formats", format_name)
     if not writable(module):
         raise UserError(
             f"format '{format_name}' can be read and not written; write transforms or colmap (convert --to)"
@@ -66,18 +84,6 @@ def write_scene(
     lens = scene.train.lens or scene.test.lens
     if lens and format_name != scene.format:
         raise UserError(f"scene '{scene.name}' has {lens} cameras, which only its own format tells; undistort it first")
-    check_out(scene, out, force)
-    with whole_folder(out) as temporary:
-        notes = module.write(scene, indices, temporary, links == "copy") or []
-        if links == "relative":
-            _relate(temporary)
-        if selection is not None:
-            write_json(temporary / "selection.json", sealed({**selection, "holdout": scene.holdout}))
-    return list(notes)
-
-
-def check_out(scene: Scene, out: Path, force: bool) -> None:
-    """Raises UserError for a folder that is not empty, unless `force` replaces it, or that holds the capture."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())) and not force:
         raise UserError(f"'{out}' exists and is not empty; name another folder or give --force")
     if out.resolve() == scene.root.resolve() or scene.root.resolve().is_relative_to(out.resolve()):

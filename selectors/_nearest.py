@@ -21,6 +21,7 @@ class Nearest:
         n = len(similar)
         self.similar = similar
         self.distance = np.full(n, np.inf)  # (N,)
+        self.owner = np.full(n, -1)  # (N,) the member that is nearest, the earlier of equal ones; −1 before any
         self.reach = np.full(n, np.inf)  # (N,) squared radius of the ball, in units of σ √2
         self.turned = similar.beta * (np.einsum("ij,ij->i", similar.turns, similar.turns).max() + 1) / 4  # β A
         self.axes = np.ascontiguousarray(similar.points.T)  # (3, N)
@@ -39,6 +40,7 @@ class Nearest:
         changed = near[nearer]
         distance[changed] = away[nearer]
         distance[i] = -np.inf
+        self.owner[changed], self.owner[i] = i, i
         if m.alpha:
             needed = (1 - distance[changed] - self.turned - m.gamma) / m.alpha  # of f_d, to come nearer still
             with np.errstate(divide="ignore"):

@@ -1,9 +1,11 @@
 """Runs one selector on a scene: checks what was asked, prepares the views, times the choice, makes `selection.json`."""
 
+import functools
 import hashlib
 import math
 import time
 from collections.abc import Sequence
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -35,11 +37,12 @@ def modules_of(selector: str) -> tuple[str, str]:
 def run(
     scene: Scene,
     selector: str,
-    count: int,
+    count: int | None,
     seed: int,
     parameters: dict[str, Any] | None = None,
     features: np.ndarray | None = None,
     sharpness: np.ndarray | None = None,
+    within: float | None = None,
     candidates: np.ndarray | None = None,
     keep: Sequence[int] = (),
 ) -> dict[str, Any]:
@@ -49,28 +52,32 @@ def run(
     views that may be chosen, all by default: the others are as if the capture did not have them. The views at `keep`
     are chosen first, whatever the selector thinks of them, and the others beside them. The random generator is seeded
     by scene, selector and seed but not by the count, so that greedy orders are prefixes of each other over ratios. Test
-    views are not looked at.
+    views are not looked at. With `within` instead of a count, that is the smallest count of a greedy order whose
+    uncovered distance is no larger (`_covering`), and `auto` in the notes says both.
 
-    Raises UserError for an unknown selector or parameter (with the nearest right one), a parameter of a wrong type, a
-    count outside [1, N] or less than the views to keep, and features or sharpness of a wrong length or with NaN.
+    Raises UserError as `checked` does, for fewer candidates than the count and for more views to keep, and for features
+    or sharpness of a wrong length or with NaN.
     """
     n = len(scene.train)
-    if n == 0:
-        raise UserError(f"scene '{scene.name}' has no training views to choose from")
-    if not 1 <= count <= n:
-        raise UserError(f"count {count} must lie in [1, {n}]: scene '{scene.name}' has {n} training views")
-    plugin = plugins.load("selectors", selector)
+    plugin, options = checked(scene, selector, count, parameters, within)
     selector = selector.replace("_", "-")
-    options = all_parameters(selector, plugin.PARAMETERS, parameters or {})
     if not scene.posed:
         options = _without_poses(scene, selector, options, features)
     if options.get("sharpness") and sharpness is None:
         raise UserError(f"'{selector}' was asked to weigh sharpness, but the sharpness of the frames was not given")
     code = code_of(selector, scene.format)  # as it is when it is loaded
     among, kept = _among(scene, count, candidates, keep)
-    views = _views(scene.train, features, sharpness, among, kept)
+    views = views_of(scene.train, features, sharpness, among, kept)
     begin = time.perf_counter()
-    choice = plugin.select(views, count, generator("select", scene.name, selector, seed), **options)
+    notes: dict[str, Any] = {}
+    if within is None:
+        choice = plugin.select(views, count, generator("select", scene.name, selector, seed), **options)
+    else:
+        from . import _covering  # no source: the order is the selector's, this says how much of it is enough
+
+        again = functools.partial(generator, "select", scene.name, selector, seed)
+        choice, reached = _covering.enough(plugin, views, within, again, options)
+        notes = {"auto": {"distance": within, "reached": reached}}
     elapsed = time.perf_counter() - begin
     similarity_s = choice.seconds.get("similarity", 0.0)
     if len(kept) and not set(kept) <= set(choice.indices.tolist()):
@@ -85,7 +92,7 @@ def run(
         "parameters": options,
         "seed": seed,
         "n_views": n,
-        "count": count,
+        "count": len(indices),
         "indices": indices,
         "names": [scene.train.names[i] for i in indices],
         "gains": None if choice.gains is None else [float(gain) for gain in choice.gains],
@@ -100,11 +107,47 @@ def run(
     }
     if among is not None:
         record |= {"candidates": len(among), "kept": len(kept)}
-    return record | ({"notes": dict(choice.notes)} if choice.notes else {})
+        if features is not None:
+            record["features_sha256"] = features_sha256(unit_rows(features, scene.train.names))
+    notes |= choice.notes
+    return record | ({"notes": notes} if notes else {})
+
+
+def checked(
+    scene: Scene,
+    selector: str,
+    count: int | None,
+    parameters: dict[str, Any] | None = None,
+    within: float | None = None,
+) -> tuple[ModuleType, dict[str, Any]]:
+    """The selector and all its parameters, as far as they can be checked before any feature is computed.
+
+    Raises UserError for an unknown selector or parameter (with the nearest right one), a parameter of a wrong type,
+    weights that are none, a count outside [1, N], and a distance `within` that it cannot choose by.
+    """
+    n = len(scene.train)
+    if n == 0:
+        raise UserError(f"scene '{scene.name}' has no training views to choose from")
+    if (count is None) == (within is None):
+        raise UserError("a choice takes either a count or a distance")
+    if count is not None and not 1 <= count <= n:
+        raise UserError(f"count {count} must lie in [1, {n}]: scene '{scene.name}' has {n} training views")
+    plugin = plugins.load("selectors", selector)
+    options = all_parameters(selector.replace("_", "-"), plugin.PARAMETERS, parameters or {})
+    weights = {key: options[key] for key in ("alpha", "beta", "sigma", "factors") if key in options}
+    if weights:
+        from ._similarity import check_weights  # no source: the selector that has weights checks them again
+
+        check_weights(**weights)
+    if within is not None:
+        from . import _covering  # no source: as above
+
+        _covering.check(selector, options, within)
+    return plugin, options
 
 
 def _among(
-    scene: Scene, count: int, candidates: np.ndarray | None, keep: Sequence[int]
+    scene: Scene, count: int | None, candidates: np.ndarray | None, keep: Sequence[int]
 ) -> tuple[np.ndarray | None, list[int]]:
     """Indices of the views that may be chosen (None for all, with nothing to keep), and which of those are kept."""
     if candidates is None and not len(keep):
@@ -113,9 +156,9 @@ def _among(
     wanted = list(dict.fromkeys(int(i) for i in keep))
     allowed[wanted] = True
     among = np.flatnonzero(allowed)
-    if len(wanted) > count:
+    if count is not None and len(wanted) > count:
         raise UserError(f"count {count} is less than the {len(wanted)} views to keep; ask for more, or keep fewer")
-    if len(among) < count:
+    if len(among) < (count or 1):
         raise UserError(
             f"count {count} is more than the {len(among)} of {len(scene.train)} training views that may be chosen"
         )
@@ -140,7 +183,7 @@ def _without_poses(scene: Scene, selector: str, options: dict[str, Any], feature
     return options | {"factors": ["sem"]}
 
 
-def _views(
+def views_of(
     train: Split,
     features: np.ndarray | None,
     sharpness: np.ndarray | None,

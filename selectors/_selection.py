@@ -69,6 +69,7 @@ def first_views(selection: dict[str, Any], count: int) -> dict[str, Any]:
     for key in ("indices", "names", "gains"):
         cut[key] = None if cut.get(key) is None else cut[key][:count]
     notes = dict(selection.get("notes") or {})
+    notes.pop("auto", None)  # it is about the whole of it
     if notes.get("below_precision_from", -1) >= count:  # nothing happened there yet
         for key in ("below_precision_from", "precision"):
             notes.pop(key, None)

@@ -99,13 +99,7 @@ def similarity(
 
     Raises UserError for weights outside [0, 1], σ ≤ 0, an unknown factor, and when nothing is left to weigh.
     """
-    if not (0 <= alpha <= 1 and 0 <= beta <= 1 and alpha + beta <= 1 + 1e-12):
-        raise UserError(f"alpha = {alpha} and beta = {beta} must lie in [0, 1] and sum to at most 1; gamma is the rest")
-    if not 0 < sigma < np.inf:
-        raise UserError(f"sigma = {sigma} must be positive; it is a length with positions scaled to [-4, 4]")
-    for factor in factors:
-        if factor not in FACTORS:
-            raise UserError(f"unknown factor '{factor}'{nearest(factor, FACTORS)} (there are: {', '.join(FACTORS)})")
+    check_weights(alpha, beta, sigma, factors)
     given: dict[str, float] = dict(zip(FACTORS, (alpha, beta, max(0.0, 1 - alpha - beta)), strict=True))
     if given["sem"] < 1e-12:
         given["sem"] = 0.0  # 1 − 0.7 − 0.3 is not quite 0
@@ -127,6 +121,17 @@ def similarity(
         features=features,
         inverse_norms=None if features is None else _inverse_norms(features),
     )
+
+
+def check_weights(alpha: float = 0.7, beta: float = 0.2, sigma: float = 0.5, factors: Sequence[str] = FACTORS) -> None:
+    """Raises UserError for weights outside [0, 1], σ ≤ 0 and an unknown factor."""
+    if not (0 <= alpha <= 1 and 0 <= beta <= 1 and alpha + beta <= 1 + 1e-12):
+        raise UserError(f"alpha = {alpha} and beta = {beta} must lie in [0, 1] and sum to at most 1; gamma is the rest")
+    if not 0 < sigma < np.inf:
+        raise UserError(f"sigma = {sigma} must be positive; it is a length with positions scaled to [-4, 4]")
+    for factor in factors:
+        if factor not in FACTORS:
+            raise UserError(f"unknown factor '{factor}'{nearest(factor, FACTORS)} (there are: {', '.join(FACTORS)})")
 
 
 def _inverse_norms(features: np.ndarray) -> np.ndarray:

@@ -8,6 +8,10 @@ a larger one, so that one run serves every ratio, `FACTORS` names the factors of
     select(views: Views, count: int, rng: numpy.random.Generator, **parameters) -> Choice
 
 chooses. It may raise UserError. Everything else (normalisation, features, the count) is decided before it is called.
+A greedy one whose `select` takes `within` stops by itself once every view left is so near to a chosen one, by
+1 − M, and says under `uncovered` in its notes how near (as `maxmin` does). The others are asked for larger and larger
+counts until that is so.
+
 A selector that compiles something may have
 
     warm() -> None

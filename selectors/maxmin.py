@@ -33,11 +33,14 @@ def select(
     factors: tuple[str, ...] = FACTORS,
     start: str = "random",
     sharpness: float = 0.0,
+    within: float | None = None,
 ) -> Choice:
     """Greedy maximiser of z_DF: k* = argmax_k min_{i ∈ S} (1 − M_ik), ties to the earlier frame.
 
     The gain of a pick is that minimum; of the first pick it is 1, the largest distance there is. `start` is "random"
     as in the authors' code, or "medoid", which needs no seed. O(N K) time and O(N) memory beside the features.
+
+    With `within` it stops as soon as every view left is that near to one chosen; `uncovered` in the notes is how near.
     """
     begin = time.perf_counter()
     similar = similarity(views, alpha, beta, sigma, factors)
@@ -47,8 +50,14 @@ def select(
     chosen = np.empty(count, dtype=np.int64)
     gains = np.empty(count)
     for k in range(count):
+        if k and within is not None and nearest.distance.max() <= within:
+            chosen, gains = chosen[:k], gains[:k]
+            break
         pick = prefer.best(nearest.distance) if k else first(start, similar, prefer, rng)
         chosen[k], gains[k] = pick, nearest.distance[pick] if k else 1.0
         prefer.take(pick)
         nearest.add(pick)
-    return Choice(chosen, gains, {"similarity": prepared_s}, describe(similar, alpha, beta, factors))
+    notes = describe(similar, alpha, beta, factors)
+    if within is not None:
+        notes["uncovered"] = max(0.0, float(nearest.distance.max()))
+    return Choice(chosen, gains, {"similarity": prepared_s}, notes)

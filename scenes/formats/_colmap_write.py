@@ -102,7 +102,9 @@ def _write_model(
 ) -> bool:
     """Writes one model of these splits; False where no single model that was read has all of their images."""
     wanted = [name for split in splits for name in names[split]]
-    if scene.format == "colmap":
+    if splits == ("train",) and "triangulated" in scene.details:
+        model = scene.details["triangulated"]
+    elif scene.format == "colmap":
         source = scene.details["models"].get("+".join(splits))
         if source is None:
             return False
@@ -113,7 +115,7 @@ def _write_model(
                 f"COLMAP model '{source}' has {len(have)} of the {len(wanted)} images to be written to {place}"
             )
     else:
-        model = _new_model(scene, cameras, wanted)
+        model = new_model(cameras, wanted, scene.points)
     (out / place).mkdir(parents=True)
     model.write(out / place)
     return True
@@ -174,8 +176,8 @@ def _without_rigs(model: Any, kept: set[str]) -> Any:
     return made
 
 
-def _new_model(scene: Scene, groups: Sequence[Cameras], names: Sequence[str]) -> Any:
-    """A model of the cameras of both splits with these image names; points have colours and no tracks."""
+def new_model(groups: Sequence[Cameras], names: Sequence[str], points: Points | None) -> Any:
+    """A model of the cameras, pinholes or OpenCV's, with these image names; points have colours and no tracks."""
     import pycolmap
 
     model = pycolmap.Reconstruction()
@@ -192,7 +194,7 @@ def _new_model(scene: Scene, groups: Sequence[Cameras], names: Sequence[str]) ->
             model.add_camera_with_trivial_rig(made)
         image = pycolmap.Image(name=name, camera_id=camera_of[key], image_id=model.num_images() + 1)
         model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(camera.world_to_camera()[0, :3]))
-    if scene.points is not None:
-        for xyz, rgb in zip(scene.points.xyz, scene.points.rgb, strict=True):
+    if points is not None:
+        for xyz, rgb in zip(points.xyz, points.rgb, strict=True):
             model.add_point3D(xyz, pycolmap.Track(), rgb)
     return model

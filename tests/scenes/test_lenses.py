@@ -1,5 +1,7 @@
 """Lens distortion: OpenCV's five parameters are read, taken out and written; other lenses are told, never ignored."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -56,9 +58,16 @@ LENS = st.tuples(
 def camera(lens, focal=1.0, centre=(0.5, 0.5), size=(64, 48)):
     """A camera with this lens; the focal length in widths, the centre in shares of the picture."""
     width, height = size
-    values = (focal * width, focal * width, centre[0] * width, centre[1] * height)
-    numbers = [np.array([value]) for value in values]
-    return Cameras(np.eye(4)[None], *numbers, np.array([width]), np.array([height]), np.array([lens]))
+    return Cameras(
+        c2w=np.eye(4)[None],
+        fx=np.array([focal * width]),
+        fy=np.array([focal * width]),
+        cx=np.array([centre[0] * width]),
+        cy=np.array([centre[1] * height]),
+        width=np.array([width]),
+        height=np.array([height]),
+        distortion=np.array([lens]),
+    )
 
 
 @settings(deadline=None, max_examples=60)
@@ -95,8 +104,7 @@ def test_pixels_are_looked_up_where_opencv_looks(lens):
 def test_the_border_of_tum_is_not_smeared():
     """At the focal length of the data set's first camera 6 % of the pixels would be past its border."""
     fx, fy, cx, cy, *lens = CAMERAS["freiburg1"]
-    numbers = [np.array([value]) for value in (fx, fy, cx + 0.5, cy + 0.5)]
-    seen = Cameras(np.eye(4)[None], *numbers, np.array([640]), np.array([480]), np.array([lens]))
+    seen = replace(camera(lens, fx / 640, ((cx + 0.5) / 640, (cy + 0.5) / 480), (640, 480)), fy=np.array([fy]))
     v, u = np.mgrid[:480, :640] + 0.5
     for at, share in ((where(seen, 1.0, u, v), 0.0596), (undistorting(seen), 0.0)):
         past = (at[0] < 0) | (at[0] > 479) | (at[1] < 0) | (at[1] > 639)

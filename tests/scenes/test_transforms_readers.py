@@ -108,8 +108,8 @@ def test_three_lists_stay_three(tmp_path, nerfstudio):
         assert names_of(nerfstudio, tmp_path / "out", split) == [Path(name).name for name in wanted]
 
 
-def read_by_3dgs(folder: Path, name: str) -> list[tuple[Path, np.ndarray, float]]:
-    """Images, rotations and angles as the 3DGS authors' code takes them."""
+def read_by_3dgs(folder: Path, name: str) -> list[tuple[Path, np.ndarray, float, tuple[int, int]]]:
+    """Images, poses, angles and sizes as the 3DGS authors' code takes them."""
     contents = json.loads((folder / name).read_text())
     found = []
     for frame in contents["frames"]:

@@ -5,114 +5,149 @@ from typing import Any
 
 import click
 
-from . import _options
+from . import _choice_options, _lists, _next, _options
 
 
-@click.command()
+@click.command(cls=_choice_options.AutoCommand)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to write the chosen subset to.")
 @click.option("--selector", default="maxmin", show_default=True, help="Way of choosing (viewbench list selectors).")
 @click.option("--ratio", type=float, help="Share of the training views, in (0, 1].")
 @click.option("--count", type=int, help="Number of views, instead of --ratio.")
+@_choice_options.auto_option
 @_options.count_rule_option
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the choice.")
-@click.option("--alpha", type=float, help="Weight of the position factor; 0.7.")
-@click.option("--beta", type=float, help="Weight of the rotation factor; 0.2. The semantic one gets the rest.")
-@click.option("--sigma", type=float, help="Width of the position factor, positions scaled to [-4, 4]; 0.5.")
-@click.option("--factors", help="Factors to use, of pos,ang,sem.")
-@click.option("--start", type=click.Choice(["random", "medoid"]), help="First view of maxmin and kcenter.")
+@_choice_options.comparison_options
 @click.option("--sample", is_flag=True, help="Draw logdet's views from the k-DPP instead of maximising.")
-@click.option("--sharpness", type=float, metavar="W", help="How much blurred frames lose; 0 ignores blur.")
-@click.option("--features", type=click.Path(path_type=Path), help="Your own N x D features (.npy).")
-@_options.encoder_option
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
 @click.option("--dry-run", is_flag=True, help="Choose and print, write nothing.")
 @click.option("--selection", type=click.Path(path_type=Path), help="Write only selection.json, to this file.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the choice: .png, .pdf, .svg or .html (3D).")
-@click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
+@click.option("--sheet", type=click.Path(path_type=Path), help="Thumbnails of the choice: .jpg, .png, .webp or .html.")
+@_lists.list_options
+@click.option(
+    "--points",
+    type=click.Choice(["all", "chosen", "triangulate"]),
+    default="all",
+    show_default=True,
+    help="Which 3D points go along: all that the training views saw, those that two chosen views see, or new ones.",
+)
+@_options.links_options
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
 @_options.scene_options
 def command(**given: Any) -> None:
-    """Choose views of SCENE and write them to --out, in the format that was read, with selection.json."""
-    import numpy as np
+    """Choose views of SCENE and write them to --out, in the format that was read, with selection.json.
 
+    How many: a share (--ratio), a number (--count), or as many as it takes (--auto), which `viewbench redundancy SCENE`
+    shows beforehand. --plot and --sheet show what was chosen.
+    """
     from ...common import settings as settings_file
     from ...common.errors import UserError
     from ...common.files import sealed, write_json
+    from ...scenes.subset import check_target, write_subset, written_format  # no source: it writes what was chosen
     from ...scenes.validate import check_present
     from ...selectors import _run
     from ...selectors._selection import count_of
 
-    if (given["ratio"] is None) == (given["count"] is None):
-        raise UserError("give either --ratio or --count")
+    if sum(given[key] is not None for key in ("ratio", "count", "auto")) != 1:
+        raise UserError("give either --ratio or --count, or --auto to have the count found")
     if not (given["out"] or given["selection"] or given["dry_run"]):
         raise UserError("give --out FOLDER, or --dry-run to see the choice without writing it")
-    if given["plot"]:
-        from ...reports._selection_plot import kind_of, plot  # no source: it draws what was chosen
-
-        kind_of(given["plot"])
+    writes = given["out"] and not given["dry_run"]
+    _check_files(given)
     settings = settings_file.load()
     scene = given["scene"].open(settings)
-    check_present(scene)
     n = len(scene.train)
     count = given["count"] if given["ratio"] is None else count_of(given["ratio"], n, given["count_rule"])
-    parameters = _options.settings_of(given["options"])
-    named = ("alpha", "beta", "sigma", "start", "sharpness")
-    parameters |= {key: given[key] for key in named if given[key] is not None}
+    parameters = _options.settings_of(given["options"]) | _choice_options.parameters_of(given)
     if given["sample"]:
         parameters["sample"] = True
-    if given["factors"] is not None:
-        parameters["factors"] = [part.strip() for part in given["factors"].split(",") if part.strip()]
     if isinstance(parameters.get("factors"), str):
         parameters["factors"] = [parameters["factors"]]
-    features = _features(scene, given, parameters, settings)
-    sharp = _sharpness(scene, settings) if parameters.get("sharpness") else None
-    record = _run.run(scene, given["selector"], count, given["seed"], parameters, features, sharp)
+    _run.checked(scene, given["selector"], count, parameters, given["auto"])
+    if writes:
+        check_target(scene, given["out"], written_format(scene), given["force"])
+    check_present(scene)
+    keep, candidates = _lists.kept(scene, given), _lists.allowed(scene, given)
+    features = _choice_options.features_of(scene, given["selector"], given, parameters, settings)
+    sharp = _choice_options.sharpness_of(scene, settings) if parameters.get("sharpness") else None
+    record = _run.run(
+        scene, given["selector"], count, given["seed"], parameters, features, sharp, given["auto"], candidates, keep
+    )
+    count = record["count"]
     for name, note in record.get("notes", {}).items():
-        click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
+        if name != "auto":
+            click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
+    if given["auto"] is not None:
+        reached = record["notes"]["auto"]["reached"]
+        words = f"every view left out is within {given['auto']:g} of a chosen one (the farthest {reached:.4f})"
+        click.echo(f"viewbench: {count:,} of {n:,} views: {words}", err=True)
     if given["selection"]:
         write_json(given["selection"], sealed(record))
-    if given["out"] and not given["dry_run"]:
-        from ...scenes.subset import write_subset  # no source: it writes what was chosen
-
-        written = write_subset(scene, record, given["out"], copy=given["copy"], force=given["force"])
+    if writes:
+        links = "copy" if given["copy"] else "relative" if given["relative"] else "absolute"
+        written, notes = write_subset(_with_points(scene, record, given), record, given["out"], links, given["force"])
         if written != scene.format:
-            click.echo(f"viewbench: format {scene.format} is only read; the subset is written as {written}", err=True)
-        if (given["out"] / "transforms_test.json").is_file():
-            hint = "the 3DGS authors' train.py trains on transforms_test.json too unless it is given --eval"
-            click.echo(f"viewbench: {hint}", err=True)
-    if given["plot"]:
-        title = f"{scene.name}: {count} of {n} views by {given['selector']}"
-        cameras = scene.train.cameras
-        plot(given["plot"], title, cameras.positions, cameras.forward, np.asarray(record["indices"]))
-    if given["out"] and not given["dry_run"]:
-        click.echo(f"viewbench: {count} of {n} views are in {given['out']}, in the order chosen:", err=True)
+            notes.insert(0, f"format {scene.format} is only read; the subset is written as {written}")
+        for note in notes:
+            click.echo(f"viewbench: {note}", err=True)
+    if given["plot"] or given["sheet"]:
+        from ...selectors._covering import compared  # no source: it looks at what was chosen
+
+        if features is None and not scene.posed:
+            features = _choice_options.features_of(scene, "maxmin", given, {}, settings)
+        similar = compared(scene, record["parameters"], features)
+        _draw(given, scene, record, similar)
+    if writes:
+        click.echo(f"viewbench: {count} of {n} views are in {given['out']}; in the order chosen:", err=True)
     if given["dry_run"] or not given["selection"]:
         for name in record["names"]:
             click.echo(name)
+    if writes:
+        for line in _next.commands(given["out"], written_format(scene), bool(len(scene.test)), scene.depth_unit):
+            click.echo(f"viewbench: next, {line}", err=True)
 
 
-def _features(scene: Any, given: dict[str, Any], parameters: dict[str, Any], settings: Any) -> Any:
-    """The features that the selector needs: the user's own, the cached ones, or None without the semantic factor."""
-    from ...common import plugins
+def _with_points(scene: Any, record: dict[str, Any], given: dict[str, Any]) -> Any:
+    """The scene with the points that --points asks for."""
+    from ...scenes import chosen_points  # no source: it writes what was chosen
 
-    if given["features"] is not None:
-        from ...scenes.features import load_user_features
-
-        return load_user_features(given["features"], len(scene.train))
-    plugins.load("selectors", given["selector"])
-    factors = parameters.get("factors", plugins.constant("selectors", given["selector"], "FACTORS", ()))
-    encoder = given["encoder"] or settings.features.encoder
-    if "sem" not in tuple(factors) or encoder == "none":
-        return None
-    from ...scenes.features import features
-
-    cache = Path(settings.features.cache)
-    progress = _options.progress("features")
-    return features(scene.train, encoder, cache, settings.features.batch, progress, settings.compute.device)
+    if given["points"] == "chosen":
+        return chosen_points.seen(scene, record["indices"])
+    if given["points"] == "triangulate":
+        return chosen_points.triangulated(scene, record["indices"], _options.progress("triangulate"))
+    return scene
 
 
-def _sharpness(scene: Any, settings: Any) -> Any:
-    """How sharp each training image is, measured once and kept."""
-    from ...scenes.sharpness import sharpness
+def _check_files(given: dict[str, Any]) -> None:
+    """Raises UserError for what cannot be written, before anything is computed that would be."""
+    if given["plot"]:
+        from ...reports._selection_plot import kind_of  # no source: it draws what was chosen
 
-    return sharpness(scene.train, Path(settings.features.cache), _options.progress("sharpness"))
+        kind_of(given["plot"])
+    if given["sheet"]:
+        from ...reports import _contact_sheet  # no source: likewise
+
+        _contact_sheet.kind_of(given["sheet"])
+    for option in ("plot", "sheet", "selection"):
+        _choice_options.check_file(f"--{option}", given[option])
+    if given["out"] and not given["dry_run"]:
+        _choice_options.check_folder("--out", given["out"].absolute().parent)
+
+
+def _draw(given: dict[str, Any], scene: Any, record: dict[str, Any], similar: Any) -> None:
+    """Draws what --plot and --sheet ask for."""
+    import numpy as np
+
+    from ...reports._picked import picked  # no source: it draws what was chosen
+
+    title = f"{scene.name}: {record['count']:,} of {record['n_views']:,} views by {record['selector']}"
+    choice = picked(scene, title, np.asarray(record["indices"]), similar, given["auto"])
+    if given["plot"]:
+        from ...reports._selection_plot import plot  # no source: likewise
+
+        plot(given["plot"], choice)
+    if given["sheet"]:
+        from ...reports import _contact_sheet  # no source: likewise
+
+        for line in _contact_sheet.draw(given["sheet"], choice, _options.progress("sheet")):
+            click.echo(f"viewbench: {line}", err=True)
