@@ -152,6 +152,7 @@ def _without_poses(scene: Scene, selector: str, options: dict[str, Any], feature
 
 
 def views_of(train: Split, features: np.ndarray | None, sharpness: np.ndarray | None) -> Views:
+    """The training views as selectors see them. Raises UserError for poses, features or sharpness with NaN."""
     cameras = train.cameras
     bad = np.flatnonzero(~np.isfinite(cameras.c2w).all(axis=(1, 2)))
     if len(bad):

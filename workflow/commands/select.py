@@ -21,7 +21,11 @@ from . import _choice_options, _options
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
 @click.option("--dry-run", is_flag=True, help="Choose and print, write nothing.")
 @click.option("--selection", type=click.Path(path_type=Path), help="Write only selection.json, to this file.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Picture of the choice: .png, .pdf, .svg or .html (3D).")
+@click.option(
+    "--plot",
+    type=click.Path(path_type=Path),
+    help="Picture of the choice in space and time: .png, .pdf, .svg or .html (3D).",
+)
 @click.option("--sheet", type=click.Path(path_type=Path), help="Thumbnails of the choice: .jpg, .png, .webp or .html.")
 @click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
@@ -70,8 +74,6 @@ def command(**given: Any) -> None:
         reached = record["notes"]["auto"]["reached"]
         words = f"every view left out is within {given['auto']:g} of a chosen one (the farthest {reached:.4f})"
         click.echo(f"viewbench: {count:,} of {n:,} views: {words}", err=True)
-    if given["selection"]:
-        write_json(given["selection"], sealed(record))
     if writes:
         written = write_subset(scene, record, given["out"], copy=given["copy"], force=given["force"])
         if written != scene.format:
@@ -79,6 +81,8 @@ def command(**given: Any) -> None:
         if (given["out"] / "transforms_test.json").is_file():
             hint = "the 3DGS authors' train.py trains on transforms_test.json too unless it is given --eval"
             click.echo(f"viewbench: {hint}", err=True)
+    if given["selection"]:
+        write_json(given["selection"], sealed(record))
     if given["plot"] or given["sheet"]:
         from ...selectors._covering import compared  # no source: it looks at what was chosen
 
