@@ -96,12 +96,18 @@ def enough(
         count, reached = _search(plugin, views, within, rng, parameters)
         choice = plugin.select(views, count, rng(), **parameters)
     if len(choice.indices) == n:
-        least = uncovered(similarity_of(views, parameters), choice.indices[:-1])[-1] if n > 1 else 0.0
+        least = _left_alone(similarity_of(views, parameters), int(choice.indices[-1]))
         raise NotEnoughError(
             f"no choice short of all {n} views is within {within:g}: without the last of them a view is {least:.3g} "
             "away; give --auto a larger distance than that, or --count"
         )
     return choice, float(reached)
+
+
+def _left_alone(similar: Similarity, i: int) -> float:
+    """D of all views but i."""
+    others = np.delete(similar.column(i), i)
+    return max(0.0, 1 - float(others.max(initial=-np.inf))) if len(others) else 0.0
 
 
 def order_within(
@@ -118,10 +124,12 @@ def order_within(
         record = _run.run(scene, "maxmin", None, seed, parameters, features, sharpness, within=within)
     except NotEnoughError:
         record = _run.run(scene, "maxmin", len(scene.train), seed, parameters, features, sharpness)
-    record.get("notes", {}).pop("auto", None)
+    reached = record.get("notes", {}).pop("auto", {"reached": 0.0})["reached"]
     similar = compared(scene, record["parameters"], features)
     assert similar is not None  # else the run had refused
-    return record, uncovered(similar, record["indices"]), similar
+    if record["parameters"]["sharpness"]:  # a pick is then not always the farthest
+        return record, uncovered(similar, record["indices"]), similar
+    return record, np.maximum([*record["gains"][1:], reached], 0), similar
 
 
 def _search(

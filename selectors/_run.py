@@ -190,7 +190,10 @@ def views_of(
     among: np.ndarray | None = None,
     kept: Sequence[int] = (),
 ) -> Views:
-    """What the selector sees: the training views, or those `among` them alone."""
+    """The training views, or those `among` them alone, as selectors see them.
+
+    Raises UserError for poses, features or sharpness with NaN.
+    """
     rows = None if features is None else unit_rows(features, train.names)
     sharp = None if sharpness is None else _per_frame(sharpness, train.names)
     if among is not None:

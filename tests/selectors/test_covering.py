@@ -139,3 +139,16 @@ def test_a_distance_that_all_views_alone_reach_is_answered_by_one_that_works():
     least = float(str(error.value).split("a view is ")[1].split()[0])
     assert least >= (1 - m.max()) * 0.99
     assert _run.run(SCENE, "maxmin", None, 0, {}, VIEWS.features, within=least * 1.01)["count"] < N
+
+
+@pytest.mark.parametrize("within", [0.9, 0.5, 1e-9])
+@pytest.mark.parametrize("sharpness", [0.0, 0.5])
+def test_the_order_of_a_distance_comes_with_its_curve(within, sharpness):
+    sharp = np.random.default_rng(3).uniform(0.1, 1, N)
+    record, curve, similar = _covering.order_within(SCENE, within, 0, {"sharpness": sharpness}, VIEWS.features, sharp)
+    order = run("maxmin", N, parameters={"sharpness": sharpness}, sharpness=sharp)["indices"]
+    assert record["indices"] == order[: len(curve)]
+    np.testing.assert_allclose(curve, _covering.uncovered(similar, record["indices"]), atol=1e-12)
+    assert curve[-1] <= within
+    assert (curve[:-1] > within).all()
+    assert "auto" not in record.get("notes", {})

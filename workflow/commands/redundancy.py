@@ -14,7 +14,13 @@ RUNS = 5
 @click.command()
 @_choice_options.comparison_options
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the first view.")
-@click.option("--at", multiple=True, type=float, metavar="S", help="Similarity to say it for; repeatable.")
+@click.option(
+    "--at",
+    multiple=True,
+    type=float,
+    metavar="S",
+    help="Similarity to say it for; repeatable. The highest ends the curve.",
+)
 @click.option("--runs", type=click.IntRange(min=0), default=RUNS, show_default=True, help="Stretches to name.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Figure of the curve: .png, .pdf, .svg or .html.")

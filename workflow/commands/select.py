@@ -21,7 +21,11 @@ from . import _choice_options, _lists, _next, _options
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
 @click.option("--dry-run", is_flag=True, help="Choose and print, write nothing.")
 @click.option("--selection", type=click.Path(path_type=Path), help="Write only selection.json, to this file.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Picture of the choice: .png, .pdf, .svg or .html (3D).")
+@click.option(
+    "--plot",
+    type=click.Path(path_type=Path),
+    help="Picture of the choice in space and time: .png, .pdf, .svg or .html (3D).",
+)
 @click.option("--sheet", type=click.Path(path_type=Path), help="Thumbnails of the choice: .jpg, .png, .webp or .html.")
 @_lists.list_options
 @click.option(
@@ -81,8 +85,6 @@ def command(**given: Any) -> None:
         reached = record["notes"]["auto"]["reached"]
         words = f"every view left out is within {given['auto']:g} of a chosen one (the farthest {reached:.4f})"
         click.echo(f"viewbench: {count:,} of {n:,} views: {words}", err=True)
-    if given["selection"]:
-        write_json(given["selection"], sealed(record))
     if writes:
         links = "copy" if given["copy"] else "relative" if given["relative"] else "absolute"
         written, notes = write_subset(_with_points(scene, record, given), record, given["out"], links, given["force"])
@@ -90,6 +92,8 @@ def command(**given: Any) -> None:
             notes.insert(0, f"format {scene.format} is only read; the subset is written as {written}")
         for note in notes:
             click.echo(f"viewbench: {note}", err=True)
+    if given["selection"]:
+        write_json(given["selection"], sealed(record))
     if given["plot"] or given["sheet"]:
         from ...selectors._covering import compared  # no source: it looks at what was chosen
 
