@@ -85,6 +85,8 @@ def seven(root):
         folder = root / f"seq-{1 + number // 6:02d}"
         image(folder / f"frame-{number:06d}.color.png", number)
         text(folder / f"frame-{number:06d}.pose.txt", pose)
+    text(root / "camera.txt", [[50, 51, 31.5, 23.5]])
+    text(root / "depth_to_color.txt", np.eye(4))
 
 
 FORMATS = {"scannet": scannet, "replica": replica, "tum-rgbd": tum, "seven-scenes": seven}
@@ -107,9 +109,8 @@ def test_poses_and_intrinsics_are_those_that_were_written(capture):
     scene = opened(root)
     assert scene.format == name
     np.testing.assert_allclose(scene.train.cameras.c2w, poses() @ OPENCV, atol=1e-6)
-    if name != "seven-scenes":
-        assert (scene.train.cameras.fx[0], scene.train.cameras.fy[0]) == (50, 51)
-        assert (scene.train.cameras.cx[0], scene.train.cameras.cy[0]) == (32, 24)
+    assert (scene.train.cameras.fx[0], scene.train.cameras.fy[0]) == (50, 51)
+    assert (scene.train.cameras.cx[0], scene.train.cameras.cy[0]) == (32, 24)
     colours = [np.asarray(Image.open(path).convert("RGB"))[0, 0, 0] for path in scene.train.paths]
     assert np.abs(np.array(colours, int) - np.arange(N)).max() <= 3  # jpg
     assert (scene.train.cameras.width[0], scene.train.cameras.height[0]) == (64, 48)
