@@ -3,6 +3,7 @@
 import dataclasses
 import os
 from pathlib import Path
+from typing import Any
 
 from ..common import plugins
 from ..common.errors import UserError, nearest
@@ -12,6 +13,7 @@ from .types import Scene
 from .validate import check_scene
 
 FORMATS = "scenes.formats"
+TRAJECTORY = "trajectory"
 
 
 def open_scene(
@@ -20,22 +22,44 @@ def open_scene(
     format: str | None = None,
     holdout: str | None = None,
     allow_outside: bool = False,
+    poses: str | None = None,
+    intrinsics: str | None = None,
+    times: str | None = None,
 ) -> Scene:
     """The scene that `environment.toml` calls by this name, or the one in this folder.
 
     `format` forces a reader, `holdout` a test split ("every:8", "blocks:8", "none") where the format has none.
-    `allow_outside` lets transforms name images outside the folder.
+    `allow_outside` lets transforms name images outside the folder. `poses` is a file with the trajectory of a folder of
+    images, `intrinsics` and `times` what goes with it (see scenes/formats/trajectory.py).
     Raises UserError for an unknown name, a folder in no known format, and whatever is wrong with its contents.
     """
     entry = settings.scenes.get(name_or_path)
     root = _folder(name_or_path, entry, settings)
-    chosen = format or (entry.format if entry else "") or detect(root)
+    chosen = format or (entry.format if entry else "")
+    posed = _posed(root, entry, poses, intrinsics, times)
+    if posed and chosen.replace("_", "-") not in ("", TRAJECTORY, "images"):
+        raise UserError(f"poses, intrinsics and times are options of a folder of images, not of format '{chosen}'")
+    chosen = TRAJECTORY if posed else chosen or detect(root)
     reader = plugins.load(FORMATS, chosen)
-    scene = reader.read(root, allow_outside=True) if allow_outside and chosen == "transforms" else reader.read(root)
+    options = posed | ({"allow_outside": True} if allow_outside and chosen == "transforms" else {})
+    scene = reader.read(root, **options)
     scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name)
     scene = hold_out(scene, holdout or (entry.holdout if entry else "") or scene.details.get("holdout", "none"))
     check_scene(scene)
     return scene
+
+
+def _posed(
+    root: Path, entry: SceneEntry | None, poses: str | None, intrinsics: str | None, times: str | None
+) -> dict[str, Any]:
+    """What the reader of trajectories is told: the arguments, else the entry's, whose paths start at its folder."""
+    told: dict[str, Any] = {"intrinsics": intrinsics or (entry.intrinsics if entry else "")}
+    for key, given, listed in (
+        ("poses", poses, entry.poses if entry else ""),
+        ("times", times, entry.times if entry else ""),
+    ):
+        told[key] = Path(given) if given else root / Path(listed).expanduser() if listed else None
+    return {key: value for key, value in told.items() if value}
 
 
 def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
@@ -63,7 +87,8 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
 def detect(root: Path) -> str:
     """Name of the format of the folder, one with poses where there is one. Raises UserError when none knows it."""
     formats = {name: plugins.load(FORMATS, name) for name in plugins.names(FORMATS)}
-    for name in sorted(formats, key=lambda name: not getattr(formats[name], "POSED", True)):
+    later = {name: (not getattr(it, "POSED", True), getattr(it, "LAST", False)) for name, it in formats.items()}
+    for name in sorted(formats, key=lambda name: later[name]):
         if formats[name].detect(root):
             return name
     if root.is_file():

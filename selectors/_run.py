@@ -14,7 +14,7 @@ from ..common.errors import UserError, nearest
 from ..common.rng import generator
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
-from ..scenes.types import Scene, Split
+from ..scenes.types import UNCALIBRATED, Scene, Split
 from ._normalise import normalise
 from ._selection import is_greedy
 from ._types import Views
@@ -121,7 +121,7 @@ def _views(train: Split, features: np.ndarray | None, sharpness: np.ndarray | No
         positions=normalise(cameras.positions),
         rotations=np.ascontiguousarray(cameras.rotations, dtype=np.float64),
         features=None if features is None else unit_rows(features, train.names),
-        intrinsics=np.stack(intrinsics, axis=1).astype(np.float64),
+        intrinsics=None if train.lens == UNCALIBRATED else np.stack(intrinsics, axis=1).astype(np.float64),
         times=train.times,
         sharpness=None if sharpness is None else _per_frame(sharpness, train.names),
     )

@@ -40,8 +40,11 @@ def opencv(values: Sequence[float], source: str) -> Intrinsics:
 
 
 def read_camera(path: Path) -> Intrinsics:
-    """Intrinsics in a text file of 4, 8 or 9 numbers. Raises UserError for anything else."""
-    return opencv(numbers(path, "intrinsics").ravel().tolist(), f"'{path}'")
+    """Intrinsics in a text file of 4, 8 or 9 numbers or a 3 x 3 matrix. Raises UserError for anything else."""
+    values = numbers(path, "intrinsics")
+    if values.shape == (3, 3) and values[2].tolist() == [0, 0, 1]:
+        return opencv(values[[0, 1, 0, 1], [0, 1, 2, 2]].tolist(), f"'{path}'")
+    return opencv(values.ravel().tolist(), f"'{path}'")
 
 
 def camera_file(*folders: Path) -> Path | None:

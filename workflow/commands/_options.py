@@ -43,12 +43,16 @@ class Capture:
     format: str | None
     holdout: str | None
     allow_outside: bool
+    poses: str | None = None
+    intrinsics: str | None = None
+    times: str | None = None
 
     def open(self, settings: "Settings", notes: bool = True) -> "Scene":
         """The scene; what its reader dropped or assumed is said on stderr unless `notes` is False."""
         from ...scenes.load import open_scene
 
         options = {"format": self.format, "holdout": self.holdout, "allow_outside": self.allow_outside}
+        options |= {"poses": self.poses, "intrinsics": self.intrinsics, "times": self.times}
         scene = open_scene(self.name, settings, **options)
         for note in scene.notes if notes else ():
             print(f"viewbench: {scene.name}: {note}", file=sys.stderr)
@@ -60,6 +64,9 @@ SCENE = (
     click.option("--format", "format_", metavar="NAME", help="Force a reader (viewbench list formats)."),
     click.option("--holdout", metavar="RULE", help="Test split where the capture has none: every:8, blocks:8 or none."),
     click.option("--allow-outside", is_flag=True, help="Let transforms name images outside the folder."),
+    click.option("--poses", metavar="FILE", help="Trajectory of a folder of images: rows of TUM or KITTI."),
+    click.option("--intrinsics", metavar="FX,FY,CX,CY", help="And their camera; k1,k2,p1,p2[,k3] may follow."),
+    click.option("--times", metavar="FILE", help="And when they were taken, where their names do not say."),
 )
 
 
@@ -68,7 +75,8 @@ def scene_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def wrapped(scene: str, format_: str | None, holdout: str | None, allow_outside: bool, **given: Any) -> None:
-        command(scene=Capture(scene, format_, holdout, allow_outside), **given)
+        posed = {key: given.pop(key) for key in ("poses", "intrinsics", "times")}
+        command(scene=Capture(scene, format_, holdout, allow_outside, **posed), **given)
 
     for option in reversed(SCENE):
         wrapped = option(wrapped)
