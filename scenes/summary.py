@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from .types import Scene
+from .types import UNCALIBRATED, Scene
 
 
 def summary(scene: Scene) -> dict[str, Any]:
@@ -21,7 +21,9 @@ def summary(scene: Scene) -> dict[str, Any]:
         "test_split": scene.holdout,
         "poses": scene.posed,
         "image_size": [f"{width} x {height}" for width, height in sizes],
-        "focal_length": sorted({round(float(f), 2) for f in cameras.fx})[:5],
+        "focal_length": sorted({round(float(f), 2) for f in cameras.fx})[:5]
+        if scene.train.lens != UNCALIBRATED
+        else [],
         "distorted": cameras.distortion is not None,
         "camera_extent": [round(float(value), 4) for value in extent],
         "points": 0 if scene.points is None else len(scene.points),

@@ -56,9 +56,9 @@ def table(path: Path, what: str) -> tuple[np.ndarray, list[int]]:
 
 def _number(word: str) -> float | None:
     try:
-        return float(NOT_A_NUMBER.sub("nan", word))
+        return float(word)
     except ValueError:
-        return None
+        return float("nan") if NOT_A_NUMBER.fullmatch(word) else None
 
 
 def numbers(path: Path, what: str) -> np.ndarray:

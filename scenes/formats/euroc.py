@@ -58,7 +58,10 @@ def read(root: Path) -> Scene:
         files += [folder / name / "data.csv", sensor]
     train = _merged(splits)
     if len(splits) > 1:
-        notes.append("two cameras on a rig: frames of one moment are neighbours in the order of the capture")
+        notes.append(
+            "two cameras on a rig: frames of one moment are neighbours in the order of the capture, so hold out "
+            "blocks:8 (after every:8 the other eye of each test view is trained on)"
+        )
     return Scene(
         name=root.name,
         root=root,
