@@ -42,7 +42,7 @@ IPHONE = (Variant("transforms.json", ("rgb",), ("rgb_masks",), "depth"),)
 def detect(root: Path) -> str | None:
     """Why the folder is in this format, or None."""
     part = _part(root)
-    return f"it has {part[1].relative_to(root).as_posix()}/ of ScanNet++ with {part[0]} poses" if part else None
+    return f"it has the {'DSLR' if part[0] == 'dslr' else 'iPhone'}'s pictures of ScanNet++" if part else None
 
 
 def _part(root: Path) -> tuple[str, Path] | None:

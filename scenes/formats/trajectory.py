@@ -61,6 +61,8 @@ def read(root: Path, poses: Path | None = None, intrinsics: str = "", times: Pat
     the folder, beside the trajectory and above the images. Without any the views can be chosen from and not written.
     Raises UserError for rows that are no pose, with their line, and where images and rows do not fit.
     """
+    if root.is_file():
+        raise UserError(f"'{root}' is a file; poses go with a folder of images, so extract the frames of a video first")
     found = folder_of_images.read(root)  # checks sizes
     paths = found.train.paths
     file = poses or _beside(root)
@@ -79,6 +81,7 @@ def read(root: Path, poses: Path | None = None, intrinsics: str = "", times: Pat
     else:
         kept, matrices, notes = _in_order(file, rows, numbers, paths)
         stamps = _stamps(paths, times)
+        stamps = None if stamps is None or np.isnan(stamps).any() else stamps
     chosen = [path for path, good in zip(paths, kept, strict=True) if good]
     lens_file = None if intrinsics else camera_file(root, chosen[0].parent, file.parent, root.absolute().parent)
     camera = given(intrinsics) if intrinsics else read_camera(lens_file) if lens_file else None

@@ -1,11 +1,13 @@
 """ScanNet, Replica, TUM RGB-D and 7-Scenes: one small capture laid out in each of their forms."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from tests.nerfstudio_code import dataparser
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.scenes.digest import scene_sha256
@@ -203,6 +205,45 @@ def test_scannets_depth_comes_along_in_another_size(tmp_path):
     assert values(scene.train.depths) == [None if i == 5 else 1000 + i for i in range(N) if i != 3]
     assert any("1 of 11 frames have no depth image" in note for note in scene.notes)
     assert scene.train.subset([0, 4]).depths == (scene.train.depths[0], None)
+
+
+# Of scene0000_00 and of a scan by another tablet: fx, fy, cx, cy of the colour and of the depth camera.
+SCANS = [
+    ((1169.621094, 1167.105103, 646.295044, 489.927032), (577.590698, 578.729797, 318.905426, 242.683609)),
+    ((1170.187988, 1170.187988, 647.75, 483.75), (571.623718, 571.623718, 319.5, 239.5)),
+]
+
+
+@pytest.mark.parametrize(("colour", "of_depth"), SCANS)
+def test_depth_of_real_scans_is_registered(tmp_path, colour, of_depth):
+    scannet(tmp_path)
+    for path in (tmp_path / "color").iterdir():
+        image(path, 0, (1296, 968))
+    depth(tmp_path / "depth" / "0.png", size=(640, 480))
+    for name, (fx, fy, cx, cy) in (("color", colour), ("depth", of_depth)):
+        text(
+            tmp_path / "intrinsic" / f"intrinsic_{name}.txt",
+            [[fx, 0, cx, 0], [0, fy, cy, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+        )
+    assert values(opened(tmp_path).train.depths) == [1000] + [None] * (N - 1)
+
+
+def test_nerfstudios_own_reader_of_scannet_has_the_same_frames(tmp_path, monkeypatch):
+    scannet(tmp_path)
+    for number in range(N):
+        depth(tmp_path / "depth" / f"{number}.png", number)
+    text(tmp_path / "pose" / "3.txt", np.full((4, 4), -np.inf))
+    scene = opened(tmp_path)
+    with dataparser("scannet_dataparser") as module:
+        monkeypatch.setattr(module, "cv2", SimpleNamespace(imread=lambda path: np.asarray(Image.open(path))))
+        config = module.ScanNetDataParserConfig(
+            data=tmp_path, auto_scale_poses=False, center_method="none", load_3D_points=False, train_split_fraction=1.0
+        )
+        theirs = config.setup().get_dataparser_outputs("train")
+    assert list(scene.train.paths) == theirs.image_filenames
+    assert list(scene.train.depths) == theirs.metadata["depth_filenames"]
+    assert scene.depth_unit == theirs.metadata["depth_unit_scale_factor"]
+    np.testing.assert_allclose(theirs.cameras.camera_to_worlds.numpy(), scene.train.cameras.c2w[:, :3], atol=1e-6)
 
 
 @pytest.mark.parametrize("wrong", ["view", "place", "shape"])

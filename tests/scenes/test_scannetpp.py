@@ -10,6 +10,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from tests.conftest import known
+from tests.nerfstudio_code import dataparser
 from tests.scenes.test_transforms import opened
 from tests.scenes.walks import matrices, walk
 from viewbench.common.errors import UserError
@@ -118,6 +119,23 @@ def test_undistorted_pictures_with_the_data_sets_test_views(tmp_path, part):
     assert [path.stem for path in masks] == [path.stem for path in (*scene.train.paths, *scene.test.paths)]
     assert any("1 training views are marked is_bad" in note for note in scene.notes)
     load_images(scene.train, np.arange(2), None)
+
+
+def test_nerfstudios_own_reader_has_the_same_splits_and_poses(tmp_path):
+    """Its ScanNetpp reads transforms.json as the data set has it, before any undistortion."""
+    folder = dslr(tmp_path, undistorted=False)
+    with dataparser("scannetpp_dataparser") as module:
+        config = module.ScanNetppDataParserConfig(
+            data=tmp_path, auto_scale_poses=False, center_method="none", orientation_method="none"
+        )
+        parsed = {split: config.setup().get_dataparser_outputs(split) for split in ("train", "test")}
+    scene = opened(folder)
+    for name, ours in (("train", scene.train), ("test", scene.test)):
+        theirs = parsed[name]
+        assert list(ours.paths) == list(theirs.image_filenames)
+        np.testing.assert_allclose(theirs.cameras.camera_to_worlds.numpy(), ours.cameras.c2w[:, :3], atol=1e-6)
+        np.testing.assert_allclose(theirs.cameras.fx.numpy()[:, 0], ours.cameras.fx)
+        assert list(ours.masks) == list(theirs.mask_filenames)
 
 
 def test_the_fisheye_pictures_can_be_chosen_and_not_trained_on(tmp_path):

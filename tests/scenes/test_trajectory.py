@@ -301,6 +301,33 @@ def test_wrong_options_end_in_a_sentence(tmp_path, options, words):
         opened(tmp_path, **options)
 
 
+def test_matrices_have_the_times_of_all_images_or_none(tmp_path):
+    """KITTI's times.txt is a time for each image."""
+    _, positions, turns = known(walk("made up"))
+    for i in range(N):
+        picture(tmp_path / f"{i:06d}.png", i)
+    np.savetxt(tmp_path / "poses.txt", matrices(positions, turns)[:N, :3].reshape(N, 12))
+    np.savetxt(tmp_path / "times.txt", 0.1 * np.arange(N))
+    told = {"poses": str(tmp_path / "poses.txt"), "times": str(tmp_path / "times.txt")}
+    np.testing.assert_allclose(known(opened(tmp_path, **told).train.times), 0.1 * np.arange(N))
+    (tmp_path / "times.txt").write_text("0.5 000003.png")
+    assert opened(tmp_path, **told).train.times is None
+
+
+def test_a_video_is_no_folder_of_images(tmp_path):
+    capture(tmp_path)
+    (tmp_path / "walk.mp4").write_bytes(b"film")
+    with pytest.raises(UserError, match="folder of images"):
+        opened(tmp_path / "walk.mp4", poses=str(tmp_path / "traj.tum"))
+
+
+def test_what_macos_leaves_beside_images_is_none(tmp_path):
+    capture(tmp_path)
+    for path in list((tmp_path / "images").iterdir()):
+        path.with_name(f"._{path.name}").write_bytes(b"\0\5\x16\7")
+    assert len(opened(tmp_path).train) == N
+
+
 def test_images_without_any_time_say_what_to_give(tmp_path):
     capture(tmp_path, name=lambda i, stamp: f"{i:06d}.png")
     with pytest.raises(UserError, match="--times"):
