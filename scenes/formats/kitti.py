@@ -28,9 +28,8 @@ def _camera(root: Path) -> int | None:
 
 def _poses(root: Path) -> Path | None:
     """poses.txt, or NN.txt in the folder poses/ that the data set has beside sequences/NN/."""
-    whole = root.resolve()
-    places = (root / "poses.txt", whole.parent.parent / "poses" / f"{whole.name}.txt")
-    return next((path for path in places if path.is_file()), None)
+    beside = [path.parent.parent / "poses" / f"{path.name}.txt" for path in (root.absolute(), root.resolve())]
+    return next((path for path in (root / "poses.txt", *beside) if path.is_file()), None)
 
 
 def read(root: Path) -> Scene:

@@ -57,8 +57,9 @@ def read(root: Path, poses: Path | None = None, intrinsics: str = "", times: Pat
     OpenCV axes, quaternions with w last. Rows with a time are matched by the times in the images' names (seconds, or
     milli-, micro- or nanoseconds since 1970) or in `times` (lines "time name", or a time for each image in order), a
     pose being interpolated between rows; without times, and matrices always, row by row to the images in natural order
-    of their names. `intrinsics` is "fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]"; else camera.txt with the same is looked for in
-    the folder, beside the trajectory and above the images. Without any the views can be chosen from and not written.
+    of their names. `intrinsics` is "fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]"; else camera.txt with the same (or a 3 x 3 matrix)
+    is looked for in the folder, in images/, beside the trajectory and above the folder where the images are in it.
+    Without any the views can be chosen from and not written.
     Raises UserError for rows that are no pose, with their line, and where images and rows do not fit.
     """
     if root.is_file():
@@ -83,7 +84,8 @@ def read(root: Path, poses: Path | None = None, intrinsics: str = "", times: Pat
         stamps = _stamps(paths, times)
         stamps = None if stamps is None or np.isnan(stamps).any() else stamps
     chosen = [path for path, good in zip(paths, kept, strict=True) if good]
-    lens_file = None if intrinsics else camera_file(root, chosen[0].parent, file.parent, root.absolute().parent)
+    above = [root.absolute().parent] if chosen[0].parent == root else []
+    lens_file = None if intrinsics else camera_file(root, chosen[0].parent, file.parent, *above)
     camera = given(intrinsics) if intrinsics else read_camera(lens_file) if lens_file else None
     folder = chosen[0].parent
     seen = camera or _nominal(chosen[0])

@@ -10,7 +10,7 @@ from ..types import Scene
 from ._frames import split
 from ._intrinsics import CAMERA, FORM, Intrinsics, camera_file, opencv, read_camera
 from ._text import lines
-from ._timed import FARTHEST_S, associate, nearest, read_tum
+from ._timed import FARTHEST_S, associate, nearest, read_tum, seconds
 
 WRITABLE = False
 DEPTH_UNIT = 1 / 5000  # metres, as the data set documents
@@ -65,26 +65,26 @@ def read(root: Path) -> Scene:
 
 
 def _listed(root: Path, name: str) -> tuple[np.ndarray, list[Path]]:
-    """Times and files of a list, in order of time; a time that is listed twice counts once, as in a dictionary."""
+    """Times in seconds and files of a list, in order of time; of a time that is listed twice the last file counts."""
     file = root / name
     rows: dict[float, str] = {}
     for number, line in lines(file, "list"):
         stamp, *rest = re.split(r"[\s,]+", line, maxsplit=1)
         image = rest[0] if rest else ""
         try:
-            seconds = float(stamp)
+            time = float(stamp)
         except ValueError:
-            seconds = np.nan
-        if not image or not np.isfinite(seconds):
+            time = np.nan
+        if not image or not np.isfinite(time):
             if not rows and not any(character.isdigit() for character in stamp):
                 continue  # a heading
             raise UserError(f"'{file}', line {number}: there should be a time and a file name, not '{line[:60]}'")
         if Path(image).is_absolute() or ".." in Path(image).parts or "\0" in image:
             raise UserError(f"'{file}', line {number}: '{image}' leaves the scene folder")
-        rows[seconds] = image
+        rows[time] = image
     if not rows:
         raise UserError(f"'{file}' lists no frames")
-    return np.array(sorted(rows)), [root / rows[stamp] for stamp in sorted(rows)]
+    return seconds(np.array(sorted(rows))), [root / rows[stamp] for stamp in sorted(rows)]
 
 
 def _depths(

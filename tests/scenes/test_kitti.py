@@ -54,6 +54,18 @@ def test_a_part_of_the_images_has_the_poses_of_their_numbers(tmp_path):
     np.testing.assert_array_equal(known(opened(part).train.times), known(opened(whole).train.times)[1::3])
 
 
+def test_a_linked_sequence_has_its_poses(tmp_path):
+    folder, _ = kitti(tmp_path / "kitti")
+    (tmp_path / "office").symlink_to(folder)
+    (tmp_path / "other" / "sequences").mkdir(parents=True)
+    (tmp_path / "other" / "sequences" / "04").symlink_to(folder)
+    np.savetxt(tmp_path / "kitti" / "poses" / "05.txt", np.tile(np.eye(4)[:3].reshape(1, 12), (N, 1)))
+    (tmp_path / "kitti" / "sequences" / "05").symlink_to(folder)  # the name in use comes first
+    for linked in ("office", "other/sequences/04"):
+        np.testing.assert_array_equal(opened(tmp_path / linked).train.cameras.c2w, opened(folder).train.cameras.c2w)
+    assert np.ptp(opened(tmp_path / "kitti" / "sequences" / "05").train.cameras.positions, axis=0).max() == 0
+
+
 def test_the_subset_is_written_as_transforms(tmp_path):
     folder, _ = kitti(tmp_path / "in")
     scene = opened(folder)

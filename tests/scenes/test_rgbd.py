@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.conftest import known
 from tests.nerfstudio_code import dataparser
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
@@ -306,6 +307,17 @@ def test_tums_depth_is_that_of_the_nearest_time(tmp_path):
     assert scene.depth_unit == 1 / 5000
     assert values(scene.train.depths) == [None if i in (4, 7) else 1000 + i for i in range(N)]
     assert any("2 of 12 frames have no depth image within" in note for note in scene.notes)
+
+
+def test_times_in_nanoseconds_are_as_good(tmp_path):
+    tum(tmp_path)
+    before = opened(tmp_path).train
+    for name in ("rgb.txt", "groundtruth.txt"):
+        rows = [line.split(" ", 1) for line in (tmp_path / name).read_text().splitlines() if not line.startswith("#")]
+        (tmp_path / name).write_text("".join(f"{round((float(t) + 1.3e9) * 1e9)} {rest}\n" for t, rest in rows))
+    after = opened(tmp_path).train
+    np.testing.assert_array_equal(after.cameras.c2w, before.cameras.c2w)
+    np.testing.assert_allclose(known(after.times) - known(before.times), 1.3e9, rtol=1e-12)
 
 
 def test_a_depth_image_belongs_to_one_frame():
