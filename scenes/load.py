@@ -37,6 +37,8 @@ def open_scene(
     root = _folder(name_or_path, entry, settings)
     chosen = format or (entry.format if entry else "")
     posed = _posed(root, entry, poses, intrinsics, times)
+    if posed and "poses" not in posed:
+        chosen = chosen or detect(root)
     if posed and chosen.replace("_", "-") not in ("", TRAJECTORY, "images"):
         raise UserError(f"poses, intrinsics and times are options of a folder of images, not of format '{chosen}'")
     chosen = TRAJECTORY if posed else chosen or detect(root)

@@ -46,16 +46,18 @@ def detect(root: Path) -> str | None:
 
 
 def _part(root: Path) -> tuple[str, Path] | None:
-    """ "dslr" or "iphone" and its folder: that of a scene, of which the DSLR comes first, or the one named."""
+    """Which part, dslr or iphone, and its folder: below that of a scene, where the DSLR comes first, or the one named."""
     for name, variants in (("dslr", DSLR), ("iphone", IPHONE)):
         for folder in (root / name, root):
             listed = any((folder / TRANSFORMS / variant.transforms).is_file() for variant in variants)
-            pictured = any((folder / images).is_dir() for variant in variants for images in variant.images)
-            if listed and (pictured or folder != root):
-                return name, folder
-            if name == "iphone" and (folder / PHONE).is_file():
+            phone = name == "iphone" and (folder / PHONE).is_file()
+            if phone or (listed and (folder != root or root.absolute().name == name or _is_dslr(folder))):
                 return name, folder
     return None
+
+
+def _is_dslr(folder: Path) -> bool:
+    return any(_folder(folder, variant.images) for variant in DSLR)
 
 
 def read(root: Path) -> Scene:

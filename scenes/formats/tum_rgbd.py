@@ -51,6 +51,8 @@ def read(root: Path) -> Scene:
     chosen = [path for path, good in zip(paths, kept, strict=True) if good]
     depths, listed = _depths(root, stamps, kept, notes)
     train = split(root, chosen, truth.poses[match[kept]], camera, stamps[kept], depths)
+    if train.depths and train.cameras.distortion is not None:
+        notes.append("depth images are distorted as the pictures are (nerfstudio corrects the pictures alone)")
     return Scene(
         name=root.name,
         root=root,

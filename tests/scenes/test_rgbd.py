@@ -307,6 +307,9 @@ def test_tums_depth_is_that_of_the_nearest_time(tmp_path):
     assert scene.depth_unit == 1 / 5000
     assert values(scene.train.depths) == [None if i in (4, 7) else 1000 + i for i in range(N)]
     assert any("2 of 12 frames have no depth image within" in note for note in scene.notes)
+    assert not any("distorted" in note for note in scene.notes)
+    text(tmp_path / "camera.txt", [[50, 51, 31.5, 23.5, 0.1, 0, 0, 0]])
+    assert any("depth images are distorted" in note for note in opened(tmp_path).notes)
 
 
 def test_times_in_nanoseconds_are_as_good(tmp_path):

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.conftest import known
 from tests.nerfstudio_code import dataparser
+from tests.scenes.test_rgbd import tum
 from tests.scenes.test_transforms import opened
 from tests.scenes.walks import matrices, walk
 from viewbench.common.errors import UserError
@@ -273,6 +274,17 @@ def test_a_broken_file_is_named(tmp_path, change, words):
     change(tmp_path)
     with pytest.raises(UserError, match=words):
         opened(tmp_path)
+
+
+def test_folders_of_other_formats_are_left_to_them(tmp_path):
+    """A sequence of TUM that was converted too has rgb/ and nerfstudio/transforms.json; so has the iPhone's part."""
+    (tmp_path / "nerfstudio").mkdir()
+    (tmp_path / "nerfstudio" / "transforms.json").write_text("{}")
+    tum(tmp_path)
+    assert opened(tmp_path).format == "tum-rgbd"
+    folder = dslr(tmp_path / "scene")
+    folder.rename(tmp_path / "only the pictures")
+    assert opened(tmp_path / "only the pictures").format == "scannetpp"
 
 
 def test_missing_folders_are_named(tmp_path):

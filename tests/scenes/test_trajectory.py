@@ -314,6 +314,11 @@ def test_matrices_have_the_times_of_all_images_or_none(tmp_path):
     assert opened(tmp_path, **told).train.times is None
 
 
+def test_intrinsics_are_not_for_captures_that_have_them(small_room):
+    with pytest.raises(UserError, match="not of format 'transforms'"):
+        opened(small_room, intrinsics=LENS)
+
+
 def test_a_video_is_no_folder_of_images(tmp_path):
     capture(tmp_path)
     (tmp_path / "walk.mp4").write_bytes(b"film")
