@@ -46,7 +46,7 @@ def detect(root: Path) -> str | None:
 
 
 def _part(root: Path) -> tuple[str, Path] | None:
-    """Which part, dslr or iphone, and its folder: below that of a scene, where the DSLR comes first, or the one named."""
+    """Which part, dslr or iphone, and its folder: below a scene's, where the DSLR comes first, or the one named."""
     for name, variants in (("dslr", DSLR), ("iphone", IPHONE)):
         for folder in (root / name, root):
             listed = any((folder / TRANSFORMS / variant.transforms).is_file() for variant in variants)
