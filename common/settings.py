@@ -25,6 +25,9 @@ class SceneEntry:
     format: str = ""
     allow_outside: bool = False
     model: int = -1
+    poses: str = ""  # trajectory of a folder of images; relative paths start at the scene's folder
+    intrinsics: str = ""  # fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]
+    times: str = ""  # times of the images, where their names have none
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from ..common.errors import UserError
 from .image_files import open_image
 from .lenses import pinholes, sampled, undistorting
-from .types import Cameras, Split
+from .types import UNCALIBRATED, Cameras, Split
 
 
 class Picture(NamedTuple):
@@ -42,6 +42,8 @@ def read_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[I
     seen past the border of the picture), alpha is laid on white. Raises UserError for mixed sizes and a lens that is
     not OpenCV's, and as it reads for a missing or broken file and a size that is not the camera's.
     """
+    if split.lens == UNCALIBRATED:
+        raise UserError("the cameras' intrinsics are not known; give --intrinsics fx,fy,cx,cy or write a camera.txt")
     if split.lens:
         raise UserError(f"cameras are {split.lens}, not pinholes; undistort the capture (colmap image_undistorter)")
     indices = np.asarray(indices, dtype=np.int64)

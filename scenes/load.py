@@ -8,6 +8,7 @@ from typing import Any
 from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import PACKAGE, SceneEntry, Settings
+from .reading import reader_of
 from .splits import hold_out
 from .types import Scene
 from .validate import check_scene
@@ -20,31 +21,23 @@ def open_scene(
     settings: Settings,
     format: str | None = None,
     holdout: str | None = None,
-    allow_outside: bool = False,
-    model: int | None = None,
+    **reading: Any,
 ) -> Scene:
     """The scene that `environment.toml` calls by this name, or the one in this folder.
 
     `format` forces a reader, `holdout` a test split ("every:8", "blocks:8", "none") where the format has none.
-    `allow_outside` lets transforms name images outside the folder, `model` is the number of a COLMAP model. What is not
-    given is taken from the entry of `environment.toml`.
+    The rest is what the readers of some formats take, and what is not given is taken from the scene's entry of
+    `environment.toml`: `allow_outside` lets transforms name images outside the folder, `model` is the number of a
+    COLMAP model, `poses` is a file with the trajectory of a folder of images, `intrinsics` and `times` what goes with it
+    (see scenes/formats/trajectory.py), `video` what `formats.video.read` takes besides.
     Raises UserError for an unknown name, a folder in no known format, an option that the format does not have, and
     whatever is wrong with its contents.
     """
     entry = settings.scenes.get(name_or_path)
     root = _folder(name_or_path, entry, settings)
-    chosen = format or (entry.format if entry else "") or detect(root)
-    reader = plugins.load(FORMATS, chosen)
-    options: dict[str, Any] = {}
-    if chosen == "transforms":
-        options["allow_outside"] = allow_outside or (entry is not None and entry.allow_outside)
-    if model is not None:
-        if chosen != "colmap":
-            raise UserError(f"'{name_or_path}' is in format {chosen}, which has no models; leave --model out")
-        options["model_number"] = model
-    elif entry is not None and entry.model >= 0 and chosen == "colmap":
-        options["model_number"] = entry.model
-    scene = reader.read(root, **options)
+    asked = format or (entry.format if entry else "")
+    chosen, options = reader_of(root, asked, entry, reading, settings, detect)
+    scene = plugins.load(FORMATS, chosen).read(root, **options)
     scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name)
     scene = _held_out(scene, holdout or "", entry.holdout if entry else "", settings)
     check_scene(scene)
@@ -91,7 +84,8 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
 def detect(root: Path) -> str:
     """Name of the format of the folder, one with poses where there is one. Raises UserError when none knows it."""
     formats = {name: plugins.load(FORMATS, name) for name in plugins.names(FORMATS)}
-    for name in sorted(formats, key=lambda name: not getattr(formats[name], "POSED", True)):
+    later = {name: (not getattr(it, "POSED", True), getattr(it, "LAST", False)) for name, it in formats.items()}
+    for name in sorted(formats, key=lambda name: later[name]):
         if formats[name].detect(root):
             return name
     if root.is_file():

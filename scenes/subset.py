@@ -12,7 +12,7 @@ from ..common import plugins
 from ..common.errors import UserError
 from ..common.files import sealed, whole_folder, write_json
 from .image_files import check_whole, is_file
-from .types import Scene
+from .types import UNCALIBRATED, Scene
 
 LINKS = ("absolute", "relative", "copy")  # how images come into a subset
 
@@ -82,7 +82,12 @@ def check_target(scene: Scene, out: Path, format_name: str, force: bool) -> None
     if not scene.posed and getattr(module, "POSED", True):
         raise UserError(f"scene '{scene.name}' has no poses, and format '{format_name}' needs them; run COLMAP on it")
     lens = scene.train.lens or scene.test.lens
-    if lens and format_name != scene.format:
+    if lens == UNCALIBRATED and getattr(module, "POSED", True):
+        raise UserError(
+            f"the intrinsics of '{scene.name}' are not known, and {format_name} needs them: give --intrinsics "
+            f"fx,fy,cx,cy, or write them into '{scene.root / 'camera.txt'}'"
+        )
+    if lens not in ("", UNCALIBRATED) and format_name != scene.format:
         raise UserError(f"scene '{scene.name}' has {lens} cameras, which only its own format tells; undistort it first")
     if out.exists() and (not out.is_dir() or any(out.iterdir())) and not force:
         raise UserError(f"'{out}' exists and is not empty; name another folder or give --force")

@@ -4,13 +4,14 @@ from typing import Any
 
 import numpy as np
 
-from .types import Scene
+from .types import UNCALIBRATED, Scene
 
 
 def summary(scene: Scene) -> dict[str, Any]:
     """Format, frames per split, image size (pixels), focal lengths (pixels), extent (scene units) and points."""
     cameras = scene.train.cameras
     sizes = sorted({(int(w), int(h)) for w, h in zip(cameras.width, cameras.height, strict=True)})
+    unknown = scene.train.lens == UNCALIBRATED
     extent = np.ptp(cameras.positions, axis=0)
     return {
         "scene": scene.name,
@@ -21,7 +22,7 @@ def summary(scene: Scene) -> dict[str, Any]:
         "test_split": scene.holdout,
         "poses": scene.posed,
         "image_size": [f"{width} x {height}" for width, height in sizes],
-        "focal_length": sorted({round(float(f), 2) for f in cameras.fx})[:5],
+        "focal_length": [] if unknown else sorted({round(float(f), 2) for f in cameras.fx})[:5],
         "distorted": cameras.distortion is not None,
         "camera_extent": [round(float(value), 4) for value in extent],
         "points": 0 if scene.points is None else len(scene.points),

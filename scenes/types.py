@@ -13,6 +13,7 @@ import numpy as np
 
 # OpenGL camera axes (x right, y up, z back) to OpenCV's (x right, y down, z forward); its own inverse.
 OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+UNCALIBRATED = "uncalibrated"  # a `Split.lens`: poses are known, intrinsics are not
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from ..common.errors import UserError, nearest
 from ..common.rng import generator
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
-from ..scenes.types import Scene, Split
+from ..scenes.types import UNCALIBRATED, Scene, Split
 from ._normalise import normalise
 from ._selection import is_greedy
 from ._types import Views
@@ -208,7 +208,7 @@ def views_of(
         positions=normalise(cameras.positions),
         rotations=np.ascontiguousarray(cameras.rotations, dtype=np.float64),
         features=rows,
-        intrinsics=np.stack(intrinsics, axis=1).astype(np.float64),
+        intrinsics=None if train.lens == UNCALIBRATED else np.stack(intrinsics, axis=1).astype(np.float64),
         times=train.times,
         sharpness=sharp,
         kept=np.array(kept, dtype=np.int64),

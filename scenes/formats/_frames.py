@@ -1,4 +1,4 @@
-"""What readers of numbered RGB-D exports share: matrices in text files, and frames that have one pinhole camera."""
+"""What readers of numbered exports share: files in the order of their numbers, poses, frames of one camera."""
 
 import re
 from collections.abc import Sequence
@@ -9,36 +9,33 @@ import numpy as np
 from ...common.errors import UserError
 from ..image_files import image_size
 from ..types import OPENCV, Cameras, Split
+from ._intrinsics import Intrinsics, check_fit
+from ._text import matrix
 
 
-def numbers(path: Path, what: str) -> np.ndarray:
-    """(rows, columns) float64 of a text file of numbers; `#` starts a comment.
+def posed(images: Sequence[Path], files: Sequence[Path], root: Path) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Which images have a pose in their file (N booleans), the (K, 4, 4) matrices of those, and notes on the others.
 
-    Raises UserError, which names the file, when it is missing, empty or has something else in it.
+    Tracking that was lost is written as infinity or NaN, or has no file. Raises UserError when no image has a pose,
+    and for a file that holds something else than a 4 x 4 matrix.
     """
-    rows = []
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"{what} '{path}' cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise UserError(f"{what} '{path}' is no text file of numbers") from None
-    try:
-        rows = [[float(word) for word in line.split("#")[0].replace(",", " ").split()] for line in text.splitlines()]
-    except ValueError as error:
-        raise UserError(f"{what} '{path}' is no text file of numbers: {error}") from None
-    rows = [row for row in rows if row]
-    if not rows or len({len(row) for row in rows}) != 1:
-        raise UserError(f"{what} '{path}' should have rows of equally many numbers")
-    return np.array(rows)
-
-
-def matrix(path: Path, what: str) -> np.ndarray:
-    """(4, 4) matrix in a text file. Raises UserError for another shape."""
-    values = numbers(path, what)
-    if values.size != 16:
-        raise UserError(f"{what} '{path}' has {values.size} numbers, expected the 16 of a 4 x 4 matrix")
-    return values.reshape(4, 4)
+    here = np.array([file.is_file() for file in files])
+    poses = np.tile(np.full((4, 4), np.nan), (len(images), 1, 1))
+    for i, file in enumerate(files):
+        if here[i]:
+            poses[i] = matrix(file, "pose")
+    finite = np.all(np.isfinite(poses), axis=(1, 2))
+    if not here.any():
+        raise UserError(f"'{root}': none of the {len(images)} images has a pose file ('{files[0]}' is missing)")
+    if not finite.any():
+        raise UserError(f"'{root}': none of the {len(images)} frames has a finite pose")
+    notes = []
+    if not here.all():
+        notes.append(f"{int((~here).sum())} of {len(images)} frames dropped: they have no pose file")
+    if (here & ~finite).any():
+        lost = int((here & ~finite).sum())
+        notes.append(f"{lost} of {len(images)} frames dropped: their pose is infinite or NaN (tracking was lost)")
+    return finite, poses[finite], notes
 
 
 def natural(name: str) -> list[tuple[int, int, str]]:
@@ -47,10 +44,11 @@ def natural(name: str) -> list[tuple[int, int, str]]:
 
 
 def by_number(folder: Path, suffixes: Sequence[str]) -> list[Path]:
-    """Files of the folder with one of the suffixes, in the order of the number in their names."""
+    """Files of the folder with one of the suffixes, in the order of the number in their names; none that are hidden."""
     if not folder.is_dir():
         return []
-    found = [path for path in folder.iterdir() if path.suffix.lower() in suffixes and path.is_file()]
+    found = [path for path in folder.iterdir() if path.name.lower().endswith(tuple(suffixes)) and path.is_file()]
+    found = [path for path in found if not path.name.startswith(".")]  # macOS leaves ._0.jpg on other disks
     return sorted(found, key=lambda path: ([int(part) for part in re.findall(r"\d+", path.name)], path.name))
 
 
@@ -58,23 +56,26 @@ def split(
     root: Path,
     paths: Sequence[Path],
     poses: np.ndarray,
-    focal: tuple[float, float],
-    centre: tuple[float, float],
+    camera: Intrinsics,
     times: np.ndarray | None = None,
-    distortion: Sequence[float] | None = None,
+    depths: Sequence[Path | None] = (),
 ) -> Split:
-    """Frames of one camera; `poses` (N, 4, 4) are camera-to-world with OpenCV axes, sizes those of the first image."""
-    width, height = image_size(paths[0])
+    """Frames of one camera; `poses` (N, 4, 4) are camera-to-world with OpenCV axes, sizes those of the first image.
+
+    `depths` may be all None, and then counts as none. Raises UserError for intrinsics that are of another size.
+    """
+    size = image_size(paths[0])
+    check_fit(camera, paths[0], size)
     one = np.ones(len(paths))
-    lens = None if distortion is None or not any(distortion) else np.tile(np.array(distortion), (len(paths), 1))
     cameras = Cameras(
         c2w=np.asarray(poses, dtype=np.float64) @ OPENCV,
-        fx=focal[0] * one,
-        fy=focal[1] * one,
-        cx=centre[0] * one,
-        cy=centre[1] * one,
-        width=np.full(len(paths), width, np.int64),
-        height=np.full(len(paths), height, np.int64),
-        distortion=lens,
+        fx=camera.fx * one,
+        fy=camera.fy * one,
+        cx=camera.cx * one,
+        cy=camera.cy * one,
+        width=np.full(len(paths), size[0], np.int64),
+        height=np.full(len(paths), size[1], np.int64),
+        distortion=np.tile(np.array(camera.lens), (len(paths), 1)) if any(camera.lens) else None,
     )
-    return Split(tuple(path.relative_to(root).as_posix() for path in paths), tuple(paths), cameras, times)
+    names = tuple(path.relative_to(root).as_posix() for path in paths)
+    return Split(names, tuple(paths), cameras, times, camera.model, tuple(depths) if any(depths) else ())

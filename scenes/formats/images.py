@@ -26,6 +26,7 @@ def _images(root: Path) -> list[Path]:
     for folder in (root, root / "images"):
         if folder.is_dir():
             found = [path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file()]
+            found = [path for path in found if not path.name.startswith("._")]  # macOS's, beside files on other disks
             if found:
                 return sorted(found, key=lambda path: natural(path.name))
     return []

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from tests.conftest import known
-from tests.scenes import test_rgbd
+from tests.scenes import test_euroc, test_kitti, test_rgbd, test_scannetpp, test_trajectory
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.scenes.digest import scene_sha256
@@ -121,12 +121,24 @@ def one_view(path):
     return Split((path.name,), (path,), nominal_cameras(np.array([[32, 24]])))
 
 
-@pytest.mark.parametrize("form", test_rgbd.FORMATS)
+LAYOUTS = {
+    **test_rgbd.FORMATS,
+    "euroc": lambda root: test_euroc.euroc(root, 1),
+    "kitti": test_kitti.kitti,
+    "scannetpp": test_scannetpp.dslr,
+    "iphone": test_scannetpp.iphone,
+    "trajectory": test_trajectory.capture,
+}
+
+
+@pytest.mark.parametrize("form", LAYOUTS)
 def test_any_bytes_in_the_files_of_other_formats(form, tmp_path):
     root = tmp_path / "capture"
     root.mkdir()
-    test_rgbd.FORMATS[form](root)
-    files = sorted(path for path in root.parent.rglob("*") if path.suffix in (".txt", ".json"))
+    LAYOUTS[form](root)
+    suffixes = (".txt", ".json", ".csv", ".yaml", ".tum")
+    files = sorted(path for path in root.parent.rglob("*") if path.suffix in suffixes)
+    root = root / "sequences" / "04" if form == "kitti" else root
 
     @settings(QUICK, max_examples=40)
     @given(

@@ -129,7 +129,7 @@ def test_cameras_of_several_lenses_have_each_its_own_pinhole():
 def test_the_data_sets_own_cameras_have_all_their_coefficients(tmp_path):
     root = tmp_path / "rgbd_dataset_freiburg1_room"
     root.mkdir()
-    tum(root)
+    tum(root, (640, 480))
     (root / "camera.txt").unlink()
     distortion = known(opened(root).train.cameras.distortion)
     np.testing.assert_allclose(distortion[0], [0.262383, -0.953104, -0.005358, 0.002628, 1.163314])

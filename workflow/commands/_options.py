@@ -51,13 +51,16 @@ class Capture:
     holdout: str | None
     allow_outside: bool
     model: int | None = None
+    poses: str | None = None
+    intrinsics: str | None = None
+    times: str | None = None
 
     def open(self, settings: "Settings", notes: bool = True) -> "Scene":
         """The scene; what its reader dropped or assumed is said on stderr unless `notes` is False."""
         from ...scenes.load import open_scene
 
-        options = {"format": self.format, "holdout": self.holdout, "model": self.model}
-        options["allow_outside"] = self.allow_outside
+        options: dict[str, Any] = {"format": self.format, "holdout": self.holdout, "allow_outside": self.allow_outside}
+        options |= {"model": self.model, "poses": self.poses, "intrinsics": self.intrinsics, "times": self.times}
         scene = open_scene(self.name, settings, **options)
         for note in scene.notes if notes else ():
             print(f"viewbench: {scene.name}: {note}", file=sys.stderr)
@@ -75,6 +78,9 @@ SCENE = (
         type=click.IntRange(min=0),
         help="Number of one of several COLMAP models; else the largest.",
     ),
+    click.option("--poses", metavar="FILE", help="Trajectory of a folder of images: rows of TUM or KITTI."),
+    click.option("--intrinsics", metavar="FX,FY,CX,CY", help="And their camera; k1,k2,p1,p2[,k3] may follow."),
+    click.option("--times", metavar="FILE", help="And when they were taken, where their names do not say."),
 )
 
 
@@ -85,7 +91,8 @@ def scene_options(command: Callable[..., None]) -> Callable[..., None]:
     def wrapped(
         scene: str, format_: str | None, holdout: str | None, allow_outside: bool, number: int | None, **given: Any
     ) -> None:
-        command(scene=Capture(scene, format_, holdout, allow_outside, number), **given)
+        posed = {key: given.pop(key) for key in ("poses", "intrinsics", "times")}
+        command(scene=Capture(scene, format_, holdout, allow_outside, number, **posed), **given)
 
     for option in reversed(SCENE):
         wrapped = option(wrapped)
