@@ -2,7 +2,9 @@
 
 import dataclasses
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from ..common import plugins
 from ..common.errors import UserError, nearest
@@ -20,18 +22,22 @@ def open_scene(
     format: str | None = None,
     holdout: str | None = None,
     allow_outside: bool = False,
+    video: Mapping[str, Any] | None = None,
 ) -> Scene:
     """The scene that `environment.toml` calls by this name, or the one in this folder.
 
     `format` forces a reader, `holdout` a test split ("every:8", "blocks:8", "none") where the format has none.
-    `allow_outside` lets transforms name images outside the folder.
+    `allow_outside` lets transforms name images outside the folder. `video` is what `formats.video.read` takes besides.
     Raises UserError for an unknown name, a folder in no known format, and whatever is wrong with its contents.
     """
     entry = settings.scenes.get(name_or_path)
     root = _folder(name_or_path, entry, settings)
     chosen = format or (entry.format if entry else "") or detect(root)
     reader = plugins.load(FORMATS, chosen)
-    scene = reader.read(root, allow_outside=True) if allow_outside and chosen == "transforms" else reader.read(root)
+    options: dict[str, Any] = {"allow_outside": True} if allow_outside and chosen == "transforms" else {}
+    if chosen == "video":
+        options |= {"cache_gb": settings.data.video_cache_gb, **(video or {})}
+    scene = reader.read(root, **options)
     scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name)
     scene = hold_out(scene, holdout or (entry.holdout if entry else "") or scene.details.get("holdout", "none"))
     check_scene(scene)

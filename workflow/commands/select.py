@@ -31,6 +31,7 @@ from . import _options
 @click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
 @_options.scene_options
+@_options.thinning_options
 def command(**given: Any) -> None:
     """Choose views of SCENE and write them to --out, in the format that was read, with selection.json."""
     import numpy as np
@@ -53,6 +54,9 @@ def command(**given: Any) -> None:
     settings = settings_file.load()
     scene = given["scene"].open(settings)
     check_present(scene)
+    # The frames that are candidates: of a video those that were read, of other captures those of a mask.
+    # TO WIRE: where it is no video, thinning.candidates(scene.train, stride, fps) goes into _run.run.
+    _options.refuse_thinning(given["scene"], scene)
     n = len(scene.train)
     count = given["count"] if given["ratio"] is None else count_of(given["ratio"], n, given["count_rule"])
     parameters = _options.settings_of(given["options"])
