@@ -64,3 +64,13 @@ def kept(n: int, times: np.ndarray | None, thinning: Thinning) -> np.ndarray:
     order = np.lexsort((np.arange(n), far, tick))
     mask[order[np.r_[True, np.diff(tick[order]) > 0]]] = True
     return mask
+
+
+def frame_name(number: int) -> str:
+    """Name of the frame with this number in the video, from 0."""
+    return f"frame_{number:06d}"
+
+
+def frame_number(name: str) -> int:
+    """Number in the video of the frame of this name."""
+    return int(name.removeprefix("frame_"))

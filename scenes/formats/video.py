@@ -12,7 +12,7 @@ from ...common.errors import UserError
 from ...common.files import read_json, whole, write_json
 from ...common.sources import code_sha256
 from ..digest import file_sha256
-from ..thinning import Thinning, kept
+from ..thinning import Thinning, frame_name, frame_number, kept
 from ..types import Scene, Split
 from ._video_cache import hold, trim
 from ._video_decode import frames
@@ -77,16 +77,6 @@ def read(
     if thinning:
         notes.append(f"{len(numbers)} of its {len(times)} frames are looked at ({thinning})")
     return replace(scene, notes=(*scene.notes, *(note for note in notes if note)))
-
-
-def frame_name(number: int) -> str:
-    """Name of the frame with this number in the video, from 0."""
-    return f"frame_{number:06d}"
-
-
-def frame_number(name: str) -> int:
-    """Number in the video of the frame of this name."""
-    return int(name.removeprefix("frame_"))
 
 
 def _table(root: Path, folder: Path) -> tuple[Packets, set[int]]:

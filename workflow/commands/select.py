@@ -22,6 +22,7 @@ from . import _options
 @click.option("--start", type=click.Choice(["random", "medoid"]), help="First view of maxmin and kcenter.")
 @click.option("--sample", is_flag=True, help="Draw logdet's views from the k-DPP instead of maximising.")
 @click.option("--sharpness", type=float, metavar="W", help="How much blurred frames lose; 0 ignores blur.")
+@click.option("--max-gap", metavar="S", help="No gap over so many seconds (0.8, 0.8s) or frames (30f) in the capture.")
 @click.option("--features", type=click.Path(path_type=Path), help="Your own N x D features (.npy).")
 @_options.encoder_option
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
@@ -70,7 +71,16 @@ def command(**given: Any) -> None:
         parameters["factors"] = [parameters["factors"]]
     features = _features(scene, given, parameters, settings)
     sharp = _sharpness(scene, settings) if parameters.get("sharpness") else None
-    record = _run.run(scene, given["selector"], count, given["seed"], parameters, features, sharp)
+
+    def choose(number: int) -> dict[str, Any]:
+        return _run.run(scene, given["selector"], number, given["seed"], parameters, features, sharp)
+
+    if given["max_gap"] is None:
+        record = choose(count)
+    else:
+        from ._gaps import without_gaps
+
+        record = without_gaps(choose, scene, count, given["max_gap"], None, sharp)
     for name, note in record.get("notes", {}).items():
         click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
     if given["selection"]:
