@@ -74,7 +74,7 @@ def check_present(scene: Scene) -> None:
                 raise UserError(f"scene '{scene.name}': the image of frame '{name}' is missing: '{path}'")
             size = image_size(path)
             first = first or size
-            if size != first:
+            if size != first and scene.posed:  # readers of captures without poses have looked at all of them
                 raise UserError(
                     f"scene '{scene.name}' mixes sizes: the image of frame '{name}' is {size[0]} x {size[1]}, "
                     f"that of '{scene.train.names[0]}' {first[0]} x {first[1]}; resize the images to one size"

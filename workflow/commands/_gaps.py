@@ -18,7 +18,7 @@ def without_gaps(
     allowed: np.ndarray | None = None,
     sharpness: np.ndarray | None = None,
 ) -> dict[str, Any]:
-    """The selection of `count` views with no gap larger than `text`; its notes have the fill, and gaps before and after.
+    """The selection of `count` views with no gap larger than `text`; its notes have fill, and gaps before and after.
 
     `choose` makes the selection of a count. `allowed` (N,) bool are the candidates. Raises UserError as `chained` does.
     """
