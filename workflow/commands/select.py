@@ -26,6 +26,11 @@ from . import _options
 @click.option("--features", type=click.Path(path_type=Path), help="Your own N x D features (.npy).")
 @_options.encoder_option
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
+@click.option(
+    "--check-matches/--no-check-matches",
+    default=None,
+    help="Match neighbours of the choice; without a word where it has no poses and OpenCV is installed.",
+)
 @click.option("--dry-run", is_flag=True, help="Choose and print, write nothing.")
 @click.option("--selection", type=click.Path(path_type=Path), help="Write only selection.json, to this file.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the choice: .png, .pdf, .svg or .html (3D).")
@@ -55,6 +60,12 @@ def command(**given: Any) -> None:
     settings = settings_file.load()
     scene = given["scene"].open(settings)
     check_present(scene)
+    folder = given["out"] if not given["dry_run"] else None
+    looks = bool(folder and not scene.posed) if given["check_matches"] is None else given["check_matches"]
+    if looks:
+        from . import _matches  # no source: it looks at what was chosen
+
+        looks = _matches.possible(given["check_matches"])
     # The frames that are candidates: of a video those that were read, of other captures those of a mask.
     # TO WIRE: where it is no video, thinning.candidates(scene.train, stride, fps) goes into _run.run.
     _options.refuse_thinning(given["scene"], scene)
@@ -94,6 +105,10 @@ def command(**given: Any) -> None:
         if (given["out"] / "transforms_test.json").is_file():
             hint = "the 3DGS authors' train.py trains on transforms_test.json too unless it is given --eval"
             click.echo(f"viewbench: {hint}", err=True)
+    if looks:
+        from . import _matches  # no source: it looks at what was chosen
+
+        _matches.check(scene, record, folder, given["selection"])
     if given["plot"]:
         title = f"{scene.name}: {count} of {n} views by {given['selector']}"
         cameras = scene.train.cameras
