@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ POSED = False
 SUFFIXES = {".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v", ".3gp", ".mts", ".m2ts"}
 SMALL = 384  # pixels of the longer side of the frames that features and sharpness are computed from
 CACHE_GB = 10
+TRIED = 5  # frames at the start that may be damaged
 
 Progress = Callable[[int, int | None, str], None]
 
@@ -44,12 +46,14 @@ def read(
     thinning: Thinning = Thinning(),  # noqa: B008
     cache_gb: int = CACHE_GB,
     progress: Progress | None = None,
+    extract: bool = True,
 ) -> Scene:
     """The frames that `thinning` leaves as training views, named frame_000000 and so on, with their times in seconds.
 
     A name has the frame's number in the video, whatever is left out. Small pictures of the frames are kept in the
     user's cache, one file a frame, by the video's content: what was decoded once is not decoded again, for another
-    thinning or after a run that was stopped. `cache_gb` bounds the cache. What is in memory is one frame.
+    thinning or after a run that was stopped. `cache_gb` bounds the cache; `extract` False makes no pictures, which
+    is enough to say what the video is. What is in memory is one frame.
     Raises UserError for a file that is no video, and when PyAV is not installed.
     """
     extras.need("av")
@@ -59,13 +63,14 @@ def read(
     packets, lost = _table(root, folder)
     times = packets.times
     numbers = np.flatnonzero(kept(len(times), times, thinning))
-    lost |= _extract(root, folder, packets, [n for n in numbers.tolist() if n not in lost], cache_gb, progress)
+    facts = _facts(root, folder, packets)
+    if extract:
+        lost |= _extract(root, folder, packets, [n for n in numbers.tolist() if n not in lost], cache_gb, progress)
     numbers = np.array([n for n in numbers.tolist() if n not in lost], dtype=np.int64)
     if len(numbers) < 2:
         raise UserError(
             f"video '{root}' has {len(numbers)} frames that can be decoded and are looked at; at least two are needed"
         )
-    facts = read_json(folder / "facts.json", "cached facts")
     names = tuple(frame_name(number) for number in numbers.tolist())
     paths = tuple(folder / f"{name}.jpg" for name in names)
     sizes = np.tile(np.array(facts["size"], dtype=np.int64), (len(names), 1))
@@ -103,6 +108,18 @@ def _table(root: Path, folder: Path) -> tuple[Packets, set[int]]:
     return packets, set(read_json(lost, "cached list") if lost.is_file() else [])
 
 
+def _facts(root: Path, folder: Path, packets: Packets) -> dict[str, Any]:
+    """Size and dynamic range of the frames, of the first one that can be decoded."""
+    file = folder / "facts.json"
+    if not file.is_file():
+        for number in range(min(len(packets.frames), TRIED)):
+            for _, frame in frames(root, packets, [number]):
+                write_json(file, {"size": size(frame), "hdr": hdr(frame)})
+                return read_json(file, "cached facts")
+        raise UserError(f"video '{root}' has no frame that can be decoded")
+    return read_json(file, "cached facts")
+
+
 def _extract(
     root: Path, folder: Path, packets: Packets, numbers: list[int], cache_gb: int, progress: Progress | None
 ) -> set[int]:
@@ -115,8 +132,6 @@ def _extract(
         return set()
     left = set(missing)
     for number, frame in frames(root, packets, missing):
-        if len(left) == len(missing) and "facts.json" not in have:
-            write_json(folder / "facts.json", {"size": size(frame), "hdr": hdr(frame)})
         with whole(folder / f"{frame_name(number)}.jpg") as temporary:
             Image.fromarray(picture(frame, SMALL)).save(temporary, format="JPEG", quality=92)
         left.discard(number)

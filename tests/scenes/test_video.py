@@ -108,6 +108,8 @@ def test_what_is_no_candidate_is_neither_decoded_nor_stored(tmp_path, monkeypatc
     path = encode(tmp_path / "walk.mp4", scenery(120), "h264")
     fed = []
     decode = _video_decode._decode
+    assert _main.run(["info", str(path), "--stride", "60"]) == 0
+    assert list(cache.glob("*/frame_*.jpg")) == []
     monkeypatch.setattr(_video_decode, "_decode", lambda s, p, w: (fed.append(p is not None), decode(s, p, w))[1])
     scene = read(path, thinning=Thinning(stride=60))
     assert len(scene.train) == 2

@@ -72,7 +72,7 @@ def _advice(scene: Scene, order: list[int], along: np.ndarray, gone: np.ndarray)
     times = scene.train.times
     at, unit = (np.arange(len(scene.train)) * 1.0, "f") if times is None or (np.diff(times) < 0).any() else (times, "s")
     least = float(np.diff(at).max())
-    gap = max(least, min(float(at[order[k + 1]] - at[order[k]]) for k in gone) / 2)
+    gap = max(least, float(np.median([at[order[k + 1]] - at[order[k]] for k in gone])) / 2)
     shown = f"{max(1, round(gap))}" if unit == "f" else f"{np.ceil(gap * 100) / 100:g}"
     need = fewest(at, float(shown))
     more = int(np.ceil(1.2 * len(order)))

@@ -46,12 +46,15 @@ class Capture:
     stride: int = 1
     fps: float | None = None
 
-    def open(self, settings: "Settings", notes: bool = True) -> "Scene":
-        """The scene; what its reader dropped or assumed is said on stderr unless `notes` is False."""
+    def open(self, settings: "Settings", notes: bool = True, pictures: bool = True) -> "Scene":
+        """The scene; what its reader dropped or assumed is said on stderr unless `notes` is False.
+
+        `pictures` False leaves a video's frames undecoded: what is said of it needs none.
+        """
         from ...scenes.load import open_scene
         from ...scenes.thinning import Thinning
 
-        video = {"thinning": Thinning(self.stride, self.fps), "progress": progress("frames")}
+        video = {"thinning": Thinning(self.stride, self.fps), "progress": progress("frames"), "extract": pictures}
         options: dict[str, Any] = {"format": self.format, "holdout": self.holdout, "video": video}
         options["allow_outside"] = self.allow_outside
         scene = open_scene(self.name, settings, **options)

@@ -17,7 +17,7 @@ def command(scene: _options.Capture, as_json: bool) -> None:
     from ...common.files import plain
     from ...scenes.summary import summary
 
-    opened = scene.open(settings_file.load(), notes=False)
+    opened = scene.open(settings_file.load(), notes=False, pictures=False)
     _options.refuse_thinning(scene, opened)
     facts = summary(opened)
     if as_json:
