@@ -33,6 +33,7 @@ class Packets:
     counted: bool = False  # numbered by decoding: `pts` are then of the frames, in the order of showing
     announced: int = 0  # frames that the file's head promises, 0 where it says nothing
     whole: bool = True  # False where reading ended in an error
+    aspect: float = 1.0  # width of a pixel by its height, 1 but for old camcorders
 
     @property
     def frames(self) -> np.ndarray:
@@ -93,6 +94,7 @@ def read_packets(root: Path) -> Packets:
     whole = True
     with opened(root) as (container, stream):
         base, codec, announced = stream.time_base, stream.codec_context.name, stream.frames
+        aspect = float(stream.sample_aspect_ratio or 1) or 1.0
         try:
             for packet in container.demux(stream):
                 if not packet.size:
@@ -104,10 +106,10 @@ def read_packets(root: Path) -> Packets:
             whole = False
     stamps = [pts for pts, _ in rows]
     if None in stamps or len(set(stamps)) < len(stamps) or not rows:
-        return _counted(root, codec, announced)
+        return _counted(root, codec, announced, aspect)
     pts, flags = np.array(stamps, dtype=np.int64), np.array([flags for _, flags in rows], dtype=np.uint8)
     _hide_undecodable(pts, flags)
-    return Packets(pts, flags, Fraction(base), codec, announced=announced, whole=whole)
+    return Packets(pts, flags, Fraction(base), codec, announced=announced, whole=whole, aspect=aspect)
 
 
 def _hide_undecodable(pts: np.ndarray, flags: np.ndarray) -> None:
@@ -117,7 +119,7 @@ def _hide_undecodable(pts: np.ndarray, flags: np.ndarray) -> None:
         flags[(np.arange(len(pts)) < keys[0]) | (pts < pts[keys[0]])] |= HIDDEN
 
 
-def _counted(root: Path, codec: str, announced: int) -> Packets:
+def _counted(root: Path, codec: str, announced: int, aspect: float) -> Packets:
     """The frames of a file whose packets do not tell them, found by decoding it once."""
     with opened(root) as (container, stream):
         base = Fraction(stream.time_base)
@@ -126,9 +128,9 @@ def _counted(root: Path, codec: str, announced: int) -> Packets:
     known = [pts for pts in stamps if pts is not None]
     if len(known) < len(stamps) or any(b <= a for a, b in itertools.pairwise(known)):
         base, stamps = 1 / Fraction(rate), list(range(len(stamps)))  # no times: equal steps
-    return Packets(
-        np.array(stamps, np.int64), np.zeros(len(stamps), np.uint8), base, codec, counted=True, announced=announced
-    )
+    none = np.zeros(len(stamps), np.uint8)
+    pts = np.array(stamps, np.int64)
+    return Packets(pts, none, base, codec, counted=True, announced=announced, aspect=aspect)
 
 
 def decoded(container: Any, stream: Any) -> Iterator[Any]:

@@ -11,12 +11,16 @@ UNKNOWN, BT709, BT2020 = 2, 1, 9  # AVColorSpace and AVColorPrimaries have the s
 HD = (1280, 576)  # pixels: a larger picture that does not say its matrix is BT.709's, as players (mpv) take it
 
 
-def picture(frame: Any, longest: int | None = None) -> np.ndarray:
-    """(H, W, 3) uint8 sRGB of a PyAV frame, with `longest` at most so many pixels on its longer side."""
+def picture(frame: Any, longest: int | None = None, aspect: float = 1.0) -> np.ndarray:
+    """(H, W, 3) uint8 sRGB of a PyAV frame, with `longest` at most so many pixels on its longer side.
+
+    Pixels come out square: `aspect` is the width of one of the frame's by its height.
+    """
     from av.video.reformatter import Interpolation
 
-    scale = 1.0 if longest is None else min(1.0, longest / max(frame.width, frame.height))
-    width, height = (max(1, round(side * scale)) for side in (frame.width, frame.height))
+    wide = frame.width * aspect
+    scale = 1.0 if longest is None else min(1.0, longest / max(wide, frame.height))
+    width, height = (max(1, round(side * scale)) for side in (wide, frame.height))
     # Without the flags swscale takes the chroma of every second pixel and rounds down.
     way = Interpolation.BICUBIC if scale == 1 else Interpolation.AREA
     way |= Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT
@@ -29,9 +33,9 @@ def picture(frame: Any, longest: int | None = None) -> np.ndarray:
     return upright(small.to_ndarray(), frame)
 
 
-def size(frame: Any) -> tuple[int, int]:
-    """(width, height) in pixels of the frame upright."""
-    height, width = upright(np.empty((frame.height, frame.width), np.bool_), frame).shape
+def size(frame: Any, aspect: float = 1.0) -> tuple[int, int]:
+    """(width, height) in pixels of the frame's picture."""
+    height, width = upright(np.empty((frame.height, round(frame.width * aspect)), np.bool_), frame).shape
     return width, height
 
 

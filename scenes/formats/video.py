@@ -96,13 +96,21 @@ def _table(root: Path, folder: Path) -> tuple[Packets, set[int]]:
                 flags=packets.flags,
                 base=np.array([packets.time_base.numerator, packets.time_base.denominator]),
                 codec=np.array(packets.codec),
+                aspect=np.array(packets.aspect),
                 facts=np.array([packets.counted, packets.announced, packets.whole], dtype=np.int64),
             )
     with np.load(file, allow_pickle=False) as table:
         counted, announced, complete = table["facts"].tolist()
         base = Fraction(*table["base"].tolist())
         packets = Packets(
-            table["pts"], table["flags"], base, str(table["codec"]), bool(counted), announced, bool(complete)
+            table["pts"],
+            table["flags"],
+            base,
+            str(table["codec"]),
+            bool(counted),
+            announced,
+            bool(complete),
+            float(table["aspect"]),
         )
     lost = folder / "lost.json"
     return packets, set(read_json(lost, "cached list") if lost.is_file() else [])
@@ -114,7 +122,7 @@ def _facts(root: Path, folder: Path, packets: Packets) -> dict[str, Any]:
     if not file.is_file():
         for number in range(min(len(packets.frames), TRIED)):
             for _, frame in frames(root, packets, [number]):
-                write_json(file, {"size": size(frame), "hdr": hdr(frame)})
+                write_json(file, {"size": size(frame, packets.aspect), "hdr": hdr(frame)})
                 return read_json(file, "cached facts")
         raise UserError(f"video '{root}' has no frame that can be decoded")
     return read_json(file, "cached facts")
@@ -133,7 +141,7 @@ def _extract(
     left = set(missing)
     for number, frame in frames(root, packets, missing):
         with whole(folder / f"{frame_name(number)}.jpg") as temporary:
-            Image.fromarray(picture(frame, SMALL)).save(temporary, format="JPEG", quality=92)
+            Image.fromarray(picture(frame, SMALL, packets.aspect)).save(temporary, format="JPEG", quality=92)
         left.discard(number)
         if progress:
             progress(len(missing) - len(left), len(missing), "")
@@ -148,7 +156,7 @@ def pictures(scene: Scene, names: list[str], longest: int | None = None) -> Iter
     packets = scene.details["packets"]
     wanted = sorted(frame_number(name) for name in names)
     for number, frame in frames(scene.root, packets, wanted):
-        yield frame_name(number), picture(frame, longest)
+        yield frame_name(number), picture(frame, longest, packets.aspect)
 
 
 def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:

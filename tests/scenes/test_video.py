@@ -167,6 +167,16 @@ def test_every_turn_that_a_file_can_ask_for(tmp_path, degrees, flip):
         assert difference.mean() < 12
 
 
+def test_pixels_that_are_not_square_come_out_square(tmp_path):
+    """1440 x 1080 shown as 1920 x 1080, in small: structure-from-motion takes pixels to be square."""
+    path = tmp_path / "walk.mp4"
+    encode(path, scenery(3), prepare=lambda s: setattr(s.codec_context, "sample_aspect_ratio", Fraction(4, 3)))
+    scene = read(path)
+    write_subset(scene, {"indices": [1]}, tmp_path / "out")
+    with Image.open(tmp_path / "out" / "images" / "frame_000001.png") as image:
+        assert image.size == (128, 64) == (scene.train.cameras.width[0], scene.train.cameras.height[0])
+
+
 def test_a_cover_is_not_the_film(tmp_path):
     path = tmp_path / "walk.mp4"
     with av.open(str(path), "w") as container:
