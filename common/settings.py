@@ -15,6 +15,7 @@ FILE = "environment.toml"
 @dataclass(frozen=True)
 class Data:
     root: str = ""  # folder of the captures that do not ship with viewbench
+    video_cache_gb: int = 10  # of small pictures of videos in the user's cache
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,14 @@ def scene_sha256(scene: Scene) -> str:
     return digest.hexdigest()
 
 
+def file_sha256(path: Path) -> str:
+    """Hex SHA-256 of one file, remembered as `scene_sha256` does. Raises UserError for one that cannot be read."""
+    try:
+        return _hashes([path])[0]
+    except OSError as error:
+        raise UserError(f"'{path}' cannot be read: {error.strerror}") from None
+
+
 def _hashes(paths: list[Path]) -> list[str]:
     """SHA-256 of each file."""
     states = [_state(path) for path in paths]

@@ -15,10 +15,12 @@ from ..common import plugins
 from ..common.errors import UserError
 from ..common.files import sha256_file, whole
 from ..common.sources import code_sha256
+from .image_files import open_image
+from .orientation import upright
 from .types import Split
 
 ENCODERS = "scenes.encoders"
-DECODING = "squeezed to a square, bicubic"  # part of what the cache is named by
+DECODING = "upright, squeezed to a square, bicubic"  # part of what the cache is named by
 
 Progress = Callable[[int, int | None, str], None]
 
@@ -101,24 +103,21 @@ def content_hash(path: Path) -> str:
 def picture(path: Path, size: int) -> np.ndarray:
     """(size, size, 3) float32 in [0, 1]: the whole picture, squeezed to a square as SigLIP's preprocessing does.
 
-    Alpha is laid on white, as for training. Raises UserError for a missing or broken file.
+    It is upright where the photo says how it was held; alpha is laid on white, as for training. Raises UserError for a
+    missing or broken file.
     """
     from PIL import Image
 
-    try:
-        with Image.open(path) as image:
-            image.draft("RGB", (2 * size, 2 * size))  # JPEG decodes at a fraction of its size where that is enough
-            if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
-                white = Image.new("RGBA", image.size, "white")
-                flat = Image.alpha_composite(white, image.convert("RGBA")).convert("RGB")
-            else:
-                flat = image.convert("RGB")
-            small = flat.resize((size, size), Image.Resampling.BICUBIC, reducing_gap=3.0)
-            return np.asarray(small, dtype=np.float32) / 255
-    except FileNotFoundError:
-        raise UserError(f"image '{path}' is missing") from None
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise UserError(f"image '{path}' cannot be read: {error}") from None
+    with open_image(path) as image:
+        image.draft("RGB", (2 * size, 2 * size))  # JPEG decodes at a fraction of its size where that is enough
+        image = upright(image)
+        if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+            white = Image.new("RGBA", image.size, "white")
+            flat = Image.alpha_composite(white, image.convert("RGBA")).convert("RGB")
+        else:
+            flat = image.convert("RGB")
+        small = flat.resize((size, size), Image.Resampling.BICUBIC, reducing_gap=3.0)
+        return np.asarray(small, dtype=np.float32) / 255
 
 
 def cached(file: Path) -> np.ndarray | None:

@@ -5,7 +5,10 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from ..common import extras  # no source: it says what to install
 from ..common.errors import UserError
+
+HEIC = {".heic", ".heif", ".hif"}  # as iPhones and some cameras write them; PIL reads them with pillow-heif
 
 
 def is_file(path: Path) -> bool:
@@ -21,6 +24,11 @@ def open_image(path: Path) -> Iterator[Any]:
     """The PIL image, not decoded yet. Raises UserError, in the body too, when it is missing, cut short or no image."""
     from PIL import Image
 
+    if path.suffix.lower() in HEIC:
+        extras.need("pillow_heif")
+        import pillow_heif  # pyright: ignore[reportMissingImports]: an extra
+
+        pillow_heif.register_heif_opener()
     try:
         with Image.open(path) as image:
             yield image

@@ -26,10 +26,10 @@ def open_scene(
     """The scene that `environment.toml` calls by this name, or the one in this folder.
 
     `format` forces a reader, `holdout` a test split ("every:8", "blocks:8", "none") where the format has none.
-    The rest is what the readers of some formats take, and what is not given is taken from the scene's entry of
+    The rest is what the readers of some formats take; what is not given is taken from the scene's entry of
     `environment.toml`: `allow_outside` lets transforms name images outside the folder, `model` is the number of a
-    COLMAP model, `poses` is a file with the trajectory of a folder of images, `intrinsics` and `times` what goes with it
-    (see scenes/formats/trajectory.py), `video` what `formats.video.read` takes besides.
+    COLMAP model, `poses` is a file with the trajectory of a folder of images, `intrinsics` and `times` go with it (see
+    scenes/formats/trajectory.py), `video` is what `formats.video.read` takes besides.
     Raises UserError for an unknown name, a folder in no known format, an option that the format does not have, and
     whatever is wrong with its contents.
     """

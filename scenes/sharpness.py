@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.errors import UserError
 from .features import Progress, cached, content_hash, save, silent
+from .image_files import open_image
 from .types import Split
 
 SIZE = 512  # pixels of the longer side: blur is judged as a share of the picture, whatever its resolution
@@ -40,14 +40,9 @@ def _grey(path: Path) -> np.ndarray:
     """(H, W) float32 luminance in [0, 1], the longer side SIZE pixels."""
     from PIL import Image
 
-    try:
-        with Image.open(path) as image:
-            image.draft("L", (2 * SIZE, 2 * SIZE))
-            scale = SIZE / max(image.size)
-            size = (max(3, round(image.width * scale)), max(3, round(image.height * scale)))
-            small = image.convert("L").resize(size, Image.Resampling.BOX)
-            return np.asarray(small, dtype=np.float32) / 255
-    except FileNotFoundError:
-        raise UserError(f"image '{path}' is missing") from None
-    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise UserError(f"image '{path}' cannot be read: {error}") from None
+    with open_image(path) as image:  # turned or not is the same: ∇² has no direction
+        image.draft("L", (2 * SIZE, 2 * SIZE))
+        scale = SIZE / max(image.size)
+        size = (max(3, round(image.width * scale)), max(3, round(image.height * scale)))
+        small = image.convert("L").resize(size, Image.Resampling.BOX)
+        return np.asarray(small, dtype=np.float32) / 255

@@ -51,14 +51,15 @@ def check_present(scene: Scene) -> None:
     Only the heads of the files are read. Of an image that was resized without its intrinsics every ray would be wrong,
     and nobody would be told.
     """
-    made_small = bool(scene.details.get("extracted"))  # a video's pictures; its cameras have the video's own size
+    # A video's pictures are made small, its cameras have its own size; readers without poses have looked at all images.
+    unlike = bool(scene.details.get("extracted")) or not scene.posed
     for split in (scene.train, scene.test):
         sizes = zip(split.cameras.width.tolist(), split.cameras.height.tolist(), strict=True)
         for name, path, size in zip(split.names, split.paths, sizes, strict=True):
             if not is_file(path):
                 raise UserError(f"scene '{scene.name}': the image of frame '{name}' is missing: '{path}'")
             found = image_size(path)
-            if found != size and not made_small:
+            if found != size and not unlike:
                 raise UserError(
                     f"scene '{scene.name}': the intrinsics of frame '{name}' are of {size[0]} x {size[1]} pixels, its "
                     f"image has {found[0]} x {found[1]}; {_remedy(size, found)}"

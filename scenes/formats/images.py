@@ -1,18 +1,20 @@
 """A folder of images without poses, before any structure-from-motion: chosen by content, time and sharpness."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ...common.errors import UserError
-from ..image_files import image_size
+from ..image_files import HEIC, image_size
+from ..orientation import must_be_written, upright_size, write_photo, written_name
 from ..subset import place_image
 from ..types import Cameras, Scene, Split
 from ._frames import natural
 
 WRITABLE = True
 POSED = False
-SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp"}
+SUFFIXES = {".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp", *HEIC}
 
 
 def detect(root: Path) -> str | None:
@@ -35,12 +37,19 @@ def _images(root: Path) -> list[Path]:
 def read(root: Path) -> Scene:
     """All images as training views, in natural order of their names, without times.
 
-    Raises UserError when there are fewer than two, when one is no image, and for images of different sizes.
+    Sizes are those of the photos as they are seen and written (`orientation`). Raises UserError when there are fewer
+    than two, when one is no image, for images of different sizes, and for HEIC photos without the package for them.
     """
     paths = _images(root)
     if len(paths) < 2:
         raise UserError(f"'{root}' has {len(paths)} images; a capture has at least two")
-    sizes = np.array([image_size(path) for path in paths], dtype=np.int64)
+    sizes = np.array([upright_size(path) for path in paths], dtype=np.int64)
+    turn, note = True, ""
+    if (sizes != sizes[0]).any():
+        stored = np.array([image_size(path) for path in paths], dtype=np.int64)
+        if not (stored != stored[0]).any():
+            sizes, turn = stored, False
+            note = "photos held upright and across are written as the sensor saw them, of one size, and not turned"
     odd = np.flatnonzero((sizes != sizes[0]).any(axis=1))
     if len(odd):
         first, other = paths[0], paths[odd[0]]
@@ -49,7 +58,8 @@ def read(root: Path) -> Scene:
             f"'{other.name}' {sizes[odd[0]][0]} x {sizes[odd[0]][1]}; resize them or keep one size"
         )
     names = tuple(path.name for path in paths)
-    return unposed(root, "images", Split(names, tuple(paths), nominal_cameras(sizes)))
+    scene = unposed(root, "images", Split(names, tuple(paths), nominal_cameras(sizes)), turn=turn)
+    return replace(scene, notes=(*scene.notes, note)) if note else scene
 
 
 def nominal_cameras(sizes: np.ndarray) -> Cameras:
@@ -78,11 +88,19 @@ def unposed(root: Path, name: str, frames: Split, files: tuple[Path, ...] = (), 
 def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
     """Writes the chosen images to images/, and those held out, if any, to test/, under their files' names.
 
+    They are linked or copied, but for those that programs would see turned or not at all (`orientation`).
+
     Raises UserError for two images of one name, which other formats keep in two folders.
     """
+    names = {path.name for split in (scene.train, scene.test) for path in split.paths}
     for folder, split in (("images", scene.train.subset(indices)), ("test", scene.test)):
         taken: dict[str, Path] = {}
         for path in split.paths:
             if taken.setdefault(path.name, path) is not path:
                 raise UserError(f"'{taken[path.name]}' and '{path}' have one name; write another format, or rename one")
-            place_image(path, out / folder / path.name, copy)
+            target = out / folder / written_name(path, names)
+            if scene.format == "images" and must_be_written(path):
+                target.parent.mkdir(exist_ok=True)
+                write_photo(path, target, bool(scene.details.get("turn", True)))
+            else:
+                place_image(path, target, copy)

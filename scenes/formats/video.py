@@ -1,6 +1,8 @@
 """A video file (by PyAV): frames chosen by content, time and sharpness, written with their original numbers."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -8,14 +10,25 @@ import numpy as np
 
 from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError
-from ...common.files import read_json, sha256_file, user_cache, whole_folder, write_json
+from ...common.files import read_json, whole, write_json
+from ...common.sources import code_sha256
+from ..digest import file_sha256
+from ..thinning import Thinning, frame_name, frame_number, kept
 from ..types import Scene, Split
+from ._video_cache import hold, trim
+from ._video_decode import frames
+from ._video_packets import Packets, read_packets
+from ._video_picture import hdr, picture, size
 from .images import nominal_cameras, unposed
 
 WRITABLE = True
 POSED = False
-SUFFIXES = {".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v"}
+SUFFIXES = {".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v", ".3gp", ".mts", ".m2ts"}
 SMALL = 384  # pixels of the longer side of the frames that features and sharpness are computed from
+CACHE_GB = 10
+TRIED = 5  # frames at the start that may be damaged
+
+Progress = Callable[[int, int | None, str], None]
 
 
 def available() -> str | None:
@@ -28,76 +41,135 @@ def detect(root: Path) -> str | None:
     return f"it is a {root.suffix} file" if root.is_file() and root.suffix.lower() in SUFFIXES else None
 
 
-def read(root: Path) -> Scene:
-    """Every frame as a training view, named frame_000000 and so on, with its time in seconds.
+def read(
+    root: Path,
+    thinning: Thinning = Thinning(),  # noqa: B008
+    cache_gb: int = CACHE_GB,
+    progress: Progress | None = None,
+    extract: bool = True,
+) -> Scene:
+    """The frames that `thinning` leaves as training views, named frame_000000 and so on, with their times in seconds.
 
-    The video is decoded once, frame by frame, into a cache of small pictures named by the file's content; what is in
-    memory is one frame. Raises UserError for a file that is no video, and when PyAV is not installed.
+    A name has the frame's number in the video, whatever is left out. Small pictures of the frames are kept in the
+    user's cache, one file a frame, by the video's content: what was decoded once is not decoded again, for another
+    thinning or after a run that was stopped. `cache_gb` bounds the cache; `extract` False makes no pictures, which
+    is enough to say what the video is. What is in memory is one frame.
+    Raises UserError for a file that is no video, and when PyAV is not installed.
     """
-    folder = user_cache("video") / f"{sha256_file(root)[:32]}-{SMALL}"
-    if not (folder / "frames.json").is_file():
-        with whole_folder(folder) as temporary:
-            times, size = _extract(root, temporary)
-            write_json(temporary / "frames.json", {"times": times, "size": size})
-    table = read_json(folder / "frames.json", "cached frames")
-    times = table["times"]
-    names = tuple(frame_name(number) for number in range(len(times)))
-    paths = tuple(folder / f"{name}.jpg" for name in names)
-    sizes = np.tile(np.array(table["size"], dtype=np.int64), (len(times), 1))
-    frames = Split(names, paths, nominal_cameras(sizes), np.array(times, dtype=np.float64))
-    return unposed(root, "video", frames, files=(root,), extracted=True)
-
-
-def frame_name(number: int) -> str:
-    """Name of the frame with this number in the video, from 0."""
-    return f"frame_{number:06d}"
-
-
-def _extract(root: Path, folder: Path) -> tuple[list[float], list[int]]:
-    times: list[float] = []
-    size = [0, 0]
-    for number, frame in enumerate(_frames(root)):
-        image = _upright(frame)
-        size = list(image.size)
-        image.thumbnail((SMALL, SMALL))
-        image.save(folder / f"{frame_name(number)}.jpg", quality=92)
-        times.append(float(frame.time) if frame.time is not None else float(number))
-    if len(times) < 2:
-        raise UserError(f"video '{root}' has {len(times)} frames that can be decoded; at least two are needed")
-    return times, size
-
-
-def _upright(frame: Any) -> Any:
-    """The frame as an image, turned as a player turns it: telephones film on their side and say so in the file."""
-    image = frame.to_image()
-    turn = getattr(frame, "rotation", 0)  # degrees counter-clockwise; PyAV has it since 13
-    return image.rotate(turn, expand=True) if turn else image
-
-
-def _frames(root: Path) -> Iterator[Any]:
     extras.need("av")
-    import av
-    from av.error import FFmpegError
+    # The code of decoding is in the name: pictures of another version are not taken for those of this one.
+    code = code_sha256("scenes.formats._video_picture", "scenes.formats._video_decode")[:8]
+    folder = hold(f"{file_sha256(root)[:32]}-{SMALL}-{code}")
+    packets, lost = _table(root, folder)
+    times = packets.times
+    numbers = np.flatnonzero(kept(len(times), times, thinning))
+    facts = _facts(root, folder, packets)
+    if extract:
+        lost |= _extract(root, folder, packets, [n for n in numbers.tolist() if n not in lost], cache_gb, progress)
+    numbers = np.array([n for n in numbers.tolist() if n not in lost], dtype=np.int64)
+    if len(numbers) < 2:
+        raise UserError(
+            f"video '{root}' has {len(numbers)} frames that can be decoded and are looked at; at least two are needed"
+        )
+    names = tuple(frame_name(number) for number in numbers.tolist())
+    paths = tuple(folder / f"{name}.jpg" for name in names)
+    sizes = np.tile(np.array(facts["size"], dtype=np.int64), (len(names), 1))
+    split = Split(names, paths, nominal_cameras(sizes), times[numbers])
+    scene = unposed(root, "video", split, files=(root,), extracted=True, assumed=str(thinning), packets=packets)
+    notes = [packets.cut, f"{len(lost)} frames cannot be decoded and are left out" if lost else ""]
+    if facts["hdr"]:
+        notes.append(f"its high dynamic range ({facts['hdr']}) is mapped to sRGB, reference white to 240 of 255")
+    if thinning:
+        notes.append(f"{len(numbers)} of its {len(times)} frames are looked at ({thinning})")
+    return replace(scene, notes=(*scene.notes, *(note for note in notes if note)))
 
-    try:
-        with av.open(str(root)) as container:
-            if not container.streams.video:
-                raise UserError(f"'{root}' has no video in it")
-            container.streams.video[0].thread_type = "AUTO"
-            yield from container.decode(video=0)
-    except (FFmpegError, ValueError, OSError) as error:
-        raise UserError(f"video '{root}' cannot be decoded: {error}") from None
+
+def _table(root: Path, folder: Path) -> tuple[Packets, set[int]]:
+    """The video's packets and the frames known to be damaged, from the cache where they are there."""
+    file = folder / "packets.npz"
+    if not file.is_file():
+        packets = read_packets(root)
+        with whole(file) as temporary, open(temporary, "wb") as stream:
+            np.savez(
+                stream,
+                pts=packets.pts,
+                flags=packets.flags,
+                base=np.array([packets.time_base.numerator, packets.time_base.denominator]),
+                codec=np.array(packets.codec),
+                aspect=np.array(packets.aspect),
+                facts=np.array([packets.counted, packets.announced, packets.whole], dtype=np.int64),
+            )
+    with np.load(file, allow_pickle=False) as table:
+        counted, announced, complete = table["facts"].tolist()
+        base = Fraction(*table["base"].tolist())
+        packets = Packets(
+            table["pts"],
+            table["flags"],
+            base,
+            str(table["codec"]),
+            bool(counted),
+            announced,
+            bool(complete),
+            float(table["aspect"]),
+        )
+    lost = folder / "lost.json"
+    return packets, set(read_json(lost, "cached list") if lost.is_file() else [])
+
+
+def _facts(root: Path, folder: Path, packets: Packets) -> dict[str, Any]:
+    """Size and dynamic range of the frames, of the first one that can be decoded."""
+    file = folder / "facts.json"
+    if not file.is_file():
+        for number in range(min(len(packets.frames), TRIED)):
+            for _, frame in frames(root, packets, [number]):
+                write_json(file, {"size": size(frame, packets.aspect), "hdr": hdr(frame)})
+                return read_json(file, "cached facts")
+        raise UserError(f"video '{root}' has no frame that can be decoded")
+    return read_json(file, "cached facts")
+
+
+def _extract(
+    root: Path, folder: Path, packets: Packets, numbers: list[int], cache_gb: int, progress: Progress | None
+) -> set[int]:
+    """Puts the small pictures that are not in the folder there; returns the frames that cannot be decoded."""
+    from PIL import Image
+
+    have = {path.name for path in folder.iterdir()}
+    missing = [number for number in numbers if f"{frame_name(number)}.jpg" not in have]
+    if not missing:
+        return set()
+    left = set(missing)
+    for number, frame in frames(root, packets, missing):
+        with whole(folder / f"{frame_name(number)}.jpg") as temporary:
+            Image.fromarray(picture(frame, SMALL, packets.aspect)).save(temporary, format="JPEG", quality=92)
+        left.discard(number)
+        if progress:
+            progress(len(missing) - len(left), len(missing), "")
+    known = folder / "lost.json"
+    write_json(known, sorted(left | set(read_json(known, "cached list") if known.is_file() else [])))
+    trim(cache_gb)
+    return left
+
+
+def pictures(scene: Scene, names: list[str], longest: int | None = None) -> Iterator[tuple[str, np.ndarray]]:
+    """(name, (H, W, 3) uint8 sRGB) of frames of the video, upright, at full size or with so long a side."""
+    packets = scene.details["packets"]
+    wanted = sorted(frame_number(name) for name in names)
+    for number, frame in frames(scene.root, packets, wanted):
+        yield frame_name(number), picture(frame, longest, packets.aspect)
 
 
 def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:
-    """Decodes the video once more and writes the chosen frames at full size, as PNG, to images/, test ones to test/."""
+    """Decodes what the chosen frames need and writes them at full size, as PNG, to images/, test ones to test/.
+
+    Raises UserError for a frame that cannot be decoded any more.
+    """
+    from PIL import Image
+
     folders = {scene.train.names[i]: out / "images" for i in indices} | dict.fromkeys(scene.test.names, out / "test")
-    left = len(folders)
-    for number, frame in enumerate(_frames(scene.root)):
-        name = frame_name(number)
-        if name in folders:
-            folders[name].mkdir(exist_ok=True)
-            _upright(frame).save(folders[name] / f"{name}.png", compress_level=4)
-            left -= 1
-            if not left:
-                break
+    for name, pixels in pictures(scene, list(folders)):
+        folder = folders.pop(name)
+        folder.mkdir(exist_ok=True)
+        Image.fromarray(pixels).save(folder / f"{name}.png", compress_level=4)
+    if folders:
+        raise UserError(f"video '{scene.root}': frame '{next(iter(folders))}' cannot be decoded; is the file the same?")

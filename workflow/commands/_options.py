@@ -54,13 +54,24 @@ class Capture:
     poses: str | None = None
     intrinsics: str | None = None
     times: str | None = None
+    stride: int = 1
+    fps: float | None = None
 
-    def open(self, settings: "Settings", notes: bool = True) -> "Scene":
-        """The scene; what its reader dropped or assumed is said on stderr unless `notes` is False."""
+    def open(self, settings: "Settings", notes: bool = True, pictures: bool = True) -> "Scene":
+        """The scene; what its reader dropped or assumed is said on stderr unless `notes` is False.
+
+        `pictures` False leaves a video's frames undecoded: what is said of it needs none.
+        """
         from ...scenes.load import open_scene
+        from ...scenes.thinning import Thinning
 
         options: dict[str, Any] = {"format": self.format, "holdout": self.holdout, "allow_outside": self.allow_outside}
         options |= {"model": self.model, "poses": self.poses, "intrinsics": self.intrinsics, "times": self.times}
+        options["video"] = {
+            "thinning": Thinning(self.stride, self.fps),
+            "progress": progress("frames"),
+            "extract": pictures,
+        }
         scene = open_scene(self.name, settings, **options)
         for note in scene.notes if notes else ():
             print(f"viewbench: {scene.name}: {note}", file=sys.stderr)
@@ -97,6 +108,27 @@ def scene_options(command: Callable[..., None]) -> Callable[..., None]:
     for option in reversed(SCENE):
         wrapped = option(wrapped)
     return wrapped
+
+
+def thinning_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options --stride and --fps; stands below `scene_options`, whose `scene` they become a part of."""
+
+    @functools.wraps(command)
+    def wrapped(scene: Capture, stride: int, fps: float | None, **given: Any) -> None:
+        command(scene=replace(scene, stride=stride, fps=fps), **given)
+
+    for option in (
+        click.option("--fps", type=float, metavar="F", help="Look at no more than F frames a second."),
+        click.option("--stride", type=int, default=1, metavar="N", help="Look at every N-th frame only."),
+    ):
+        wrapped = option(wrapped)
+    return wrapped
+
+
+def refuse_thinning(capture: Capture, scene: "Scene") -> None:
+    """Raises UserError for --stride and --fps with a capture whose frames are all looked at by this command."""
+    if scene.format != "video" and (capture.stride > 1 or capture.fps is not None):
+        raise UserError(f"--stride and --fps thin a video here, and '{capture.name}' is in format {scene.format}")
 
 
 def settings_of(values: tuple[str, ...]) -> dict[str, Any]:

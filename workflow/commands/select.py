@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from ...common.errors import UserError
 from . import _choice_options, _lists, _next, _options
 
 
@@ -19,6 +20,13 @@ from . import _choice_options, _lists, _next, _options
 @_choice_options.comparison_options
 @click.option("--sample", is_flag=True, help="Draw logdet's views from the k-DPP instead of maximising.")
 @click.option("--set", "options", multiple=True, metavar="KEY=VALUE", help="Parameter of the selector; repeatable.")
+@_lists.list_options
+@click.option("--max-gap", metavar="S", help="No gap over so many seconds (0.8, 0.8s) or frames (30f) in the capture.")
+@click.option(
+    "--check-matches/--no-check-matches",
+    default=None,
+    help="Match neighbours of the choice; without a word where it has no poses and OpenCV is installed.",
+)
 @click.option("--dry-run", is_flag=True, help="Choose and print, write nothing.")
 @click.option("--selection", type=click.Path(path_type=Path), help="Write only selection.json, to this file.")
 @click.option(
@@ -27,7 +35,6 @@ from . import _choice_options, _lists, _next, _options
     help="Picture of the choice in space and time: .png, .pdf, .svg or .html (3D).",
 )
 @click.option("--sheet", type=click.Path(path_type=Path), help="Thumbnails of the choice: .jpg, .png, .webp or .html.")
-@_lists.list_options
 @click.option(
     "--points",
     type=click.Choice(["all", "chosen", "triangulate"]),
@@ -38,6 +45,7 @@ from . import _choice_options, _lists, _next, _options
 @_options.links_options
 @click.option("--force", is_flag=True, help="Replace --out when it is not empty.")
 @_options.scene_options
+@_options.thinning_options
 def command(**given: Any) -> None:
     """Choose views of SCENE and write them to --out, in the format that was read, with selection.json.
 
@@ -45,19 +53,14 @@ def command(**given: Any) -> None:
     shows beforehand. --plot and --sheet show what was chosen.
     """
     from ...common import settings as settings_file
-    from ...common.errors import UserError
     from ...common.files import sealed, write_json
-    from ...scenes.subset import check_target, write_subset, written_format  # no source: it writes what was chosen
+    from ...scenes.subset import check_target, written_format  # no source: it writes what was chosen
     from ...scenes.validate import check_present
     from ...selectors import _run
     from ...selectors._selection import count_of
 
-    if sum(given[key] is not None for key in ("ratio", "count", "auto")) != 1:
-        raise UserError("give either --ratio or --count, or --auto to have the count found")
-    if not (given["out"] or given["selection"] or given["dry_run"]):
-        raise UserError("give --out FOLDER, or --dry-run to see the choice without writing it")
-    writes = given["out"] and not given["dry_run"]
-    _check_files(given)
+    _check_options(given)
+    writes = bool(given["out"]) and not given["dry_run"]
     settings = settings_file.load()
     scene = given["scene"].open(settings)
     n = len(scene.train)
@@ -68,41 +71,52 @@ def command(**given: Any) -> None:
     if isinstance(parameters.get("factors"), str):
         parameters["factors"] = [parameters["factors"]]
     _run.checked(scene, given["selector"], count, parameters, given["auto"])
+    keep, candidates = _lists.kept(scene, given), _candidates(scene, given)
     if writes:
         check_target(scene, given["out"], written_format(scene), given["force"])
     check_present(scene)
-    keep, candidates = _lists.kept(scene, given), _lists.allowed(scene, given)
+    looks = _looks(scene, given, writes)
     features = _choice_options.features_of(scene, given["selector"], given, parameters, settings)
     sharp = _choice_options.sharpness_of(scene, settings) if parameters.get("sharpness") else None
-    record = _run.run(
-        scene, given["selector"], count, given["seed"], parameters, features, sharp, given["auto"], candidates, keep
-    )
-    count = record["count"]
-    for name, note in record.get("notes", {}).items():
-        if name != "auto":
-            click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
-    if given["auto"] is not None:
-        reached = record["notes"]["auto"]["reached"]
-        words = f"every view left out is within {given['auto']:g} of a chosen one (the farthest {reached:.4f})"
-        click.echo(f"viewbench: {count:,} of {n:,} views: {words}", err=True)
+
+    def choose(number: int | None) -> dict[str, Any]:
+        return _run.run(
+            scene,
+            given["selector"],
+            number,
+            given["seed"],
+            parameters,
+            features,
+            sharp,
+            given["auto"],
+            candidates,
+            keep,
+        )
+
+    if given["max_gap"] is None:
+        record = choose(count)
+    else:
+        from ._gaps import without_gaps
+
+        assert count is not None
+        record = without_gaps(choose, scene, count, given["max_gap"], candidates, sharp)
+        if not set(keep) <= set(record["indices"]):
+            raise UserError("the views to keep leave no room to fill the gaps; raise --count or --max-gap")
+    _say(record, given)
     if writes:
-        links = "copy" if given["copy"] else "relative" if given["relative"] else "absolute"
-        written, notes = write_subset(_with_points(scene, record, given), record, given["out"], links, given["force"])
-        if written != scene.format:
-            notes.insert(0, f"format {scene.format} is only read; the subset is written as {written}")
-        for note in notes:
-            click.echo(f"viewbench: {note}", err=True)
+        _write(scene, record, given)
     if given["selection"]:
         write_json(given["selection"], sealed(record))
-    if given["plot"] or given["sheet"]:
-        from ...selectors._covering import compared  # no source: it looks at what was chosen
+    if looks:
+        from . import _matches  # no source: it looks at what was chosen
 
+        _matches.check(scene, record, given["out"] if writes else None, given["selection"])
+    if given["plot"] or given["sheet"]:
         if features is None and not scene.posed:
             features = _choice_options.features_of(scene, "maxmin", given, {}, settings)
-        similar = compared(scene, record["parameters"], features)
-        _draw(given, scene, record, similar)
+        _draw(given, scene, record, features)
     if writes:
-        click.echo(f"viewbench: {count} of {n} views are in {given['out']}; in the order chosen:", err=True)
+        click.echo(f"viewbench: {record['count']} of {n} views are in {given['out']}; in the order chosen:", err=True)
     if given["dry_run"] or not given["selection"]:
         for name in record["names"]:
             click.echo(name)
@@ -111,19 +125,16 @@ def command(**given: Any) -> None:
             click.echo(f"viewbench: next, {line}", err=True)
 
 
-def _with_points(scene: Any, record: dict[str, Any], given: dict[str, Any]) -> Any:
-    """The scene with the points that --points asks for."""
-    from ...scenes import chosen_points  # no source: it writes what was chosen
-
-    if given["points"] == "chosen":
-        return chosen_points.seen(scene, record["indices"])
-    if given["points"] == "triangulate":
-        return chosen_points.triangulated(scene, record["indices"], _options.progress("triangulate"))
-    return scene
-
-
-def _check_files(given: dict[str, Any]) -> None:
-    """Raises UserError for what cannot be written, before anything is computed that would be."""
+def _check_options(given: dict[str, Any]) -> None:
+    """Raises UserError for options that do not go together, and for what cannot be written, before any work is done."""
+    if sum(given[key] is not None for key in ("ratio", "count", "auto")) != 1:
+        raise UserError("give either --ratio or --count, or --auto to have the count found")
+    if not (given["out"] or given["selection"] or given["dry_run"]):
+        raise UserError("give --out FOLDER, or --dry-run to see the choice without writing it")
+    if given["auto"] is not None and given["max_gap"] is not None:
+        raise UserError("--max-gap fills gaps of a count; give --ratio or --count in place of --auto")
+    if given["copy"] and given["relative"]:
+        raise UserError("give either --copy or --relative: what is copied is not linked")
     if given["plot"]:
         from ...reports._selection_plot import kind_of  # no source: it draws what was chosen
 
@@ -138,13 +149,68 @@ def _check_files(given: dict[str, Any]) -> None:
         _choice_options.check_folder("--out", given["out"].absolute().parent)
 
 
-def _draw(given: dict[str, Any], scene: Any, record: dict[str, Any], similar: Any) -> None:
+def _candidates(scene: Any, given: dict[str, Any]) -> Any:
+    """(N,) bool, the views that may be chosen: those looked at (--stride, --fps) and not excluded; None for all.
+
+    Of a video those looked at are all that was read.
+    """
+    from ...scenes.thinning import candidates
+
+    capture, allowed = given["scene"], _lists.allowed(scene, given)
+    if scene.format == "video" or (capture.stride == 1 and capture.fps is None):
+        return allowed
+    looked_at = candidates(scene.train, capture.stride, capture.fps)
+    return looked_at if allowed is None else looked_at & allowed
+
+
+def _looks(scene: Any, given: dict[str, Any], writes: bool) -> bool:
+    """Whether neighbours are matched."""
+    asked = given["check_matches"]
+    if asked is False or (asked is None and not (writes and not scene.posed)):
+        return False
+    from . import _matches  # no source: it looks at what was chosen
+
+    return _matches.possible(asked)
+
+
+def _say(record: dict[str, Any], given: dict[str, Any]) -> None:
+    """What a user must know of the choice."""
+    for name, note in record.get("notes", {}).items():
+        if name != "auto":
+            click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
+    if given["auto"] is not None:
+        reached = record["notes"]["auto"]["reached"]
+        among = f"{record['count']:,} of {record.get('candidates', record['n_views']):,} views"
+        words = f"every view left out is within {given['auto']:g} of a chosen one (the farthest {reached:.4f})"
+        click.echo(f"viewbench: {among}: {words}", err=True)
+
+
+def _write(scene: Any, record: dict[str, Any], given: dict[str, Any]) -> None:
+    """Writes the subset with the points that --points asks for, and says what of it is not as it was."""
+    from ...scenes import chosen_points  # no source: it writes what was chosen
+    from ...scenes.subset import write_subset  # no source: likewise
+
+    if given["points"] == "chosen":
+        scene = chosen_points.seen(scene, record["indices"])
+    elif given["points"] == "triangulate":
+        scene = chosen_points.triangulated(scene, record["indices"], _options.progress("triangulate"))
+    links = "copy" if given["copy"] else "relative" if given["relative"] else "absolute"
+    written, notes = write_subset(scene, record, given["out"], links, given["force"])
+    if written != scene.format:
+        notes.insert(0, f"format {scene.format} is only read; the subset is written as {written}")
+    for note in notes:
+        click.echo(f"viewbench: {note}", err=True)
+
+
+def _draw(given: dict[str, Any], scene: Any, record: dict[str, Any], features: Any) -> None:
     """Draws what --plot and --sheet ask for."""
     import numpy as np
 
     from ...reports._picked import picked  # no source: it draws what was chosen
+    from ...selectors._covering import compared  # no source: it looks at what was chosen
 
     title = f"{scene.name}: {record['count']:,} of {record['n_views']:,} views by {record['selector']}"
+    similar = compared(scene, record["parameters"], features)
     choice = picked(scene, title, np.asarray(record["indices"]), similar, given["auto"])
     if given["plot"]:
         from ...reports._selection_plot import plot  # no source: likewise
