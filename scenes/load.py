@@ -6,10 +6,11 @@ from pathlib import Path
 
 from ..common import plugins
 from ..common.errors import UserError, nearest
-from ..common.settings import PACKAGE, SceneEntry, Settings
+from ..common.settings import SceneEntry, Settings
 from .splits import hold_out
 from .types import Scene
 from .validate import check_scene
+from .whereabouts import absence, folder_of  # no source: where a scene lies; what is read there counts
 
 FORMATS = "scenes.formats"
 
@@ -27,7 +28,7 @@ def open_scene(
     `allow_outside` lets transforms name images outside the folder.
     Raises UserError for an unknown name, a folder in no known format, and whatever is wrong with its contents.
     """
-    entry = settings.scenes.get(name_or_path)
+    entry = _entry(name_or_path, settings)
     root = _folder(name_or_path, entry, settings)
     chosen = format or (entry.format if entry else "") or detect(root)
     reader = plugins.load(FORMATS, chosen)
@@ -38,9 +39,15 @@ def open_scene(
     return scene
 
 
+def _entry(name: str, settings: Settings) -> SceneEntry | None:
+    """What is known of the name; a folder that is here comes before the catalogue, and after environment.toml."""
+    # os.path.exists, unlike Path.exists, takes any text for a name.
+    here = name not in settings.scenes and os.path.exists(name)  # noqa: PTH110
+    return None if here else settings.entry(name)
+
+
 def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
     if entry is None:
-        # os.path.exists, unlike Path.exists, takes any text for a name.
         if os.path.exists(name):  # noqa: PTH110
             return Path(name)
         known = list(settings.scenes)
@@ -48,16 +55,10 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
             f"no folder and no scene of {settings.source} is called '{name}'{nearest(name, known)} "
             f"(scenes: {', '.join(known)})"
         )
-    if entry.path.startswith("package:"):
-        return PACKAGE / entry.path.removeprefix("package:")
-    path = Path(entry.path).expanduser()
-    if not path.is_absolute():
-        if not settings.data.root:
-            raise UserError(f"scene '{name}' is below data.root, which is not set; set VIEWBENCH_DATA or data.root")
-        path = Path(settings.data.root).expanduser() / path
-    if not path.exists():
-        raise UserError(f"scene '{name}' should be in '{path}', which is not there; correct data.root or its path")
-    return path
+    absent = absence([name], settings)
+    if absent:
+        raise UserError(absent)
+    return folder_of(entry, settings)
 
 
 def detect(root: Path) -> str:

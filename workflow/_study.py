@@ -165,12 +165,13 @@ def _row(backend: str, scene: str, selector: str, ratio: float, seed: int) -> di
 
 
 def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
+    raw = {**raw, "scenes": [_one_word(scene) for scene in raw["scenes"]]}
     selectors = tuple(_selector(entry) for entry in raw["selectors"])
     backends = tuple(_backend(entry, raw, settings) for entry in raw["backends"])
     reports = [name.replace("_", "-") for name in raw.get("reports", plugins.names("reports"))]
     known_scenes = list(settings.scenes)
     for scene in raw["scenes"]:
-        if scene not in known_scenes:
+        if settings.entry(scene) is None:
             raise UserError(
                 f"study '{path}': unknown scene '{scene}'{nearest(scene, known_scenes)}; "
                 f"name it in {settings.source} as [scenes.{scene}]"
@@ -221,6 +222,11 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
     )
 
 
+def _one_word(scene: str) -> str:
+    """DATASET.SCENE for DATASET/SCENE of the catalogue: a scene is one folder in results."""
+    return scene.replace("/", ".")
+
+
 def _selector(entry: str | dict) -> SelectorEntry:
     if isinstance(entry, str):
         return SelectorEntry(entry, entry)
@@ -260,6 +266,8 @@ def _options_of(name: str, settings: Settings) -> dict[str, Any]:
 
 def _grid(given: dict[str, Any]) -> dict[str, Any]:
     grid = dict(given)
+    if "scenes" in grid:
+        grid["scenes"] = [_one_word(scene) for scene in grid["scenes"]]
     if "seeds" in grid:
         grid["seeds"] = list(_seeds(grid["seeds"]))
     if "ratios" in grid:

@@ -42,11 +42,16 @@ def command(context: click.Context, study: str, out: Path, jobs: int | None, opt
     """
     from ...common import extras
     from ...common import settings as settings_file
+    from ...common.errors import UserError
+    from ...scenes.whereabouts import absence
     from .. import _study
 
     extras.need(*NEEDED, use="running a study needs", extra="study")
     settings = settings_file.load()
-    name = _study.load(study, settings).name
+    loaded = _study.load(study, settings)
+    name, absent = loaded.name, absence(loaded.scenes, settings)
+    if absent:
+        raise UserError(absent)
     out.mkdir(parents=True, exist_ok=True)
     status = _wait(subprocess.Popen(arguments(study, out, jobs, options), env=environment(settings)))
     page = out / "results" / name / "reports" / "index.html"

@@ -1,0 +1,293 @@
+"""Brings one scene of the catalogue to the folder of captures: whole or not at all, and from where it broke off."""
+
+import contextlib
+import hashlib
+import shutil
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ...common import plugins
+from ...common.catalogue import Archive, DataSet, Listed, size_in_words
+from ...common.errors import UserError
+from ...common.files import read_json, sha256_file, write_json
+from . import drive
+from .hashes import Hashes
+from .http import Patience, kind_of
+from .ranges import ChangedError, NoRangesError, RangeFile
+from .room import check_room
+from .unpack import damaged, extract, extract_tar, is_right, members, spans, unpack_nested
+from .whole import download
+
+RECEIPT = "download.json"  # in the scene's folder: what it was made from, and what belongs to it
+RESTARTS = 3  # times that an archive may become another one while it is read
+
+Progress = Callable[[int, int | None, str], None]  # bytes that are there, of how many, of what
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where downloads go, and what they have in common."""
+
+    root: Path  # the folder of captures
+    say: Say
+    progress: Progress = lambda done, total, text: None
+    patience: Patience = field(default_factory=Patience)
+
+    @property
+    def hashes(self) -> Hashes:
+        return Hashes(self.root, self.say)
+
+    def kept(self, address: str, name: str) -> Path:
+        """Where a whole file is kept while it is needed."""
+        mark = hashlib.sha256(address.encode()).hexdigest()[:8]
+        return self.root / ".viewbench" / "archives" / f"{mark}-{name}"
+
+
+def is_there(scene: Listed, data: DataSet, root: Path) -> bool:
+    """Whether the scene is there and complete.
+
+    Raises UserError where a folder is there that is neither what was downloaded nor a capture that was put there by
+    hand.
+    """
+    folder = root / scene.path
+    if not folder.exists():
+        return False
+    if (folder / RECEIPT).is_file():
+        files = read_json(folder / RECEIPT, "receipt").get("files", {})
+        wrong = [name for name, size in files.items() if _size(folder / name) != size]
+        if wrong:
+            raise UserError(
+                f"'{folder}' is there, but {len(wrong)} of its {len(files)} files are missing or changed, such as "
+                f"'{wrong[0]}'; --force fetches it again"
+            )
+    elif not plugins.load("scenes.formats", data.format).detect(folder):
+        raise UserError(f"'{folder}' is there, and is no {data.format} capture; remove it, or --force replaces it")
+    return True
+
+
+def bring(scene: Listed, data: DataSet, place: Place, force: bool = False) -> Path:
+    """The scene's folder, which is fetched unless it is there; with `force` again.
+
+    Raises UserError for whatever is wrong at the server, on the way or here, and says what to do. What came is kept
+    beside the folder, and a later call goes on from it.
+    """
+    folder = place.root / scene.path
+    with _alone(scene, place.root):
+        if not force and is_there(scene, data, place.root):
+            return folder
+        staging = folder.with_name(f".part-{folder.name}")
+        state = _State(place.root / ".viewbench" / "state" / f"{scene.name.replace('/', '+')}.json", staging)
+        state.begin(force)
+        if scene.archive is None:
+            made_from = drive.bring(scene, data, staging, folder, place)
+        elif kind_of(scene.archive.address) == "zip":
+            made_from = _zip(scene, scene.archive, staging, state, place)
+        else:
+            made_from = _tar(scene, scene.archive, staging, place)
+        if not plugins.load("scenes.formats", data.format).detect(staging):
+            raise UserError(
+                f"'{staging}' has what the archive calls '{scene.prefix}', which is no {data.format} capture"
+            )
+        _publish(scene, data, staging, folder, made_from)
+        state.end()
+    return folder
+
+
+def _zip(scene: Listed, archive: Archive, staging: Path, state: "_State", place: Place) -> dict[str, Any]:
+    """Parts of the archive where the server gives them, else all of it."""
+    for _ in range(RESTARTS):
+        try:
+            with contextlib.closing(RangeFile(archive.address, "zip", place.patience)) as remote:
+                return _members(scene, archive, remote, staging, state, place)
+        except ChangedError:
+            place.say(f"'{archive.address}' has changed while it was read: begun anew")
+        except NoRangesError:
+            break
+    else:
+        raise UserError(f"'{archive.address}' becomes another file again and again while it is read; try later")
+    path = place.kept(archive.address, Path(archive.address).name)
+    if not path.is_file():
+        words = size_in_words(archive.bytes, archive.about_gb) or "size not known"
+        place.say(f"the server gives no parts of '{archive.address}': the whole archive ({words}) is fetched")
+    made_from = _whole(archive, path, scene, place) | _members(scene, archive, path, staging, state, place)
+    if scene.shared == 1:
+        path.unlink()
+    else:
+        place.say(f"the archive is kept for its other scenes in '{path}'; remove it when you need none of them")
+    return made_from
+
+
+def _members(
+    scene: Listed, archive: Archive, source: RangeFile | Path, staging: Path, state: "_State", place: Place
+) -> dict[str, Any]:
+    """Takes the scene out of the archive: what is there and right is left alone."""
+    name = archive.address
+    with damaged(name), zipfile.ZipFile(source) as opened:
+        directory = _directory_sha256(opened)
+        if isinstance(source, RangeFile):
+            place.hashes.check(name, "directory", directory, record=False)
+        state.of(directory)
+        chosen = members(opened, scene.prefix, scene.also, name)
+        inner = {relative for relative in chosen if scene.nested and kind_of(relative) == "zip"}
+        wanted = {
+            relative: info
+            for relative, info in chosen.items()
+            if not (relative in state.unpacked if relative in inner else is_right(staging / relative, info))
+        }
+        total, left = _bytes(chosen), _bytes(wanted)
+        twice = max((chosen[relative].file_size for relative in inner), default=0)
+        check_room(staging, left + twice)
+        if len(wanted) < len(chosen):
+            place.say(f"{scene.name}: {len(chosen) - len(wanted)} of {len(chosen)} files are there already")
+        if isinstance(source, RangeFile):
+            source.plan(spans(opened, list(wanted.values())))
+        done = _Count(scene.name, total - left, total, place.progress)
+        staging.mkdir(parents=True, exist_ok=True)
+        for relative, info in wanted.items():
+            extract(opened, {relative: info}, staging, name, done)
+            if relative in inner:
+                unpack_nested(staging / relative, name, lambda count: None)
+                state.has_unpacked(relative)
+        done.finish()
+        if isinstance(source, RangeFile):
+            place.hashes.check(name, "directory", directory)
+    return {"directory_sha256": directory}
+
+
+def _tar(scene: Listed, archive: Archive, staging: Path, place: Place) -> dict[str, Any]:
+    path = place.kept(archive.address, Path(archive.address).name)
+    made_from = _whole(archive, path, scene, place)
+    shutil.rmtree(staging, ignore_errors=True)
+    staging.mkdir(parents=True)
+    count = _Count(f"{scene.name}: unpack", 0, None, place.progress)
+    try:
+        extract_tar(path, scene.prefix, scene.also, staging, archive.address, count)
+    except UserError:
+        path.unlink()  # it is not what it should be, and would not be the next time
+        raise
+    path.unlink()
+    return made_from
+
+
+def _whole(archive: Archive, path: Path, scene: Listed, place: Place) -> dict[str, Any]:
+    """Downloads the archive unless it is there, and checks its hash."""
+    if not path.is_file():
+        check_room(path.parent, archive.bytes or int(archive.about_gb * 1e9))
+
+        def progress(done: int, total: int | None) -> None:
+            place.progress(done, total, scene.name)
+
+        download(archive.address, path, place.patience, progress, place.say)
+    sha256 = sha256_file(path)
+    try:
+        if kind_of(path.name) == "zip":
+            with damaged(archive.address), zipfile.ZipFile(path):
+                pass  # it has a directory, so that what is recorded now is an archive
+        place.hashes.check(archive.address, "file", sha256)
+    except UserError:
+        path.unlink()
+        raise
+    return {"sha256": sha256}
+
+
+def _directory_sha256(archive: zipfile.ZipFile) -> str:
+    """One hash of the names, lengths and CRC-32s of all members."""
+    lines = (f"{info.CRC:08x} {info.file_size} {info.filename}\n" for info in archive.infolist())
+    return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def _bytes(infos: dict[str, zipfile.ZipInfo]) -> int:
+    return sum(info.file_size for info in infos.values())
+
+
+def _publish(scene: Listed, data: DataSet, staging: Path, folder: Path, made_from: dict[str, Any]) -> None:
+    """Writes the receipt and renames the folder; an old one goes only then."""
+    address = scene.archive.address if scene.archive else f"https://drive.google.com/drive/folders/{data.drive}"
+    found = sorted(path for path in staging.rglob("*") if path.is_file())
+    files = {path.relative_to(staging).as_posix(): path.stat().st_size for path in found}
+    licence = {"name": data.licence.name, "address": data.licence.address}
+    record = {"schema": 1, "scene": scene.name, "address": address, **made_from, "licence": licence, "files": files}
+    write_json(staging / RECEIPT, record)
+    old = folder.with_name(f".old-{folder.name}")
+    shutil.rmtree(old, ignore_errors=True)
+    if folder.exists():
+        folder.replace(old)
+    staging.replace(folder)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _size(path: Path) -> int | None:
+    return path.stat().st_size if path.is_file() else None
+
+
+@contextlib.contextmanager
+def _alone(scene: Listed, root: Path) -> Iterator[None]:
+    """Keeps a second call for the same scene out. Raises UserError in that one."""
+    import fcntl
+
+    path = root / ".viewbench" / "locks" / scene.name.replace("/", "+")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with open(path, "w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise UserError(f"{scene.name} is being downloaded by another call of viewbench; wait for it") from None
+        yield
+
+
+class _Count:
+    """Adds up bytes for the line that shows progress."""
+
+    def __init__(self, text: str, done: int, total: int | None, progress: Progress):
+        self.text, self.done, self.total, self.progress = text, done, total, progress
+
+    def __call__(self, count: int) -> None:
+        self.done += count
+        self.progress(self.done, self.total, self.text)
+
+    def finish(self) -> None:
+        self.progress(self.done, self.done, self.text)
+
+
+class _State:
+    """What is known of a scene that is half there."""
+
+    def __init__(self, path: Path, staging: Path):
+        self.path, self.staging = path, staging
+        record = {}
+        with contextlib.suppress(UserError):
+            record = read_json(path) if path.is_file() else {}
+        self.record: dict[str, Any] = record if isinstance(record, dict) else {}
+
+    @property
+    def unpacked(self) -> list[str]:
+        """Archives in the archive that are unpacked, and gone."""
+        return self.record.get("unpacked", [])
+
+    def begin(self, force: bool) -> None:
+        """Forgets what came unless it is of a call that wanted the same: --force begins anew once, and then goes on."""
+        if force and not self.record.get("force"):
+            shutil.rmtree(self.staging, ignore_errors=True)
+            self.record = {}
+        self._write(force=force or self.record.get("force", False))
+
+    def of(self, directory: str) -> None:
+        """Forgets what came from another archive than the one with this directory."""
+        if self.record.get("directory", directory) != directory:
+            shutil.rmtree(self.staging, ignore_errors=True)
+            self.record = {"force": self.record.get("force", False)}
+        self._write(directory=directory)
+
+    def has_unpacked(self, relative: str) -> None:
+        self._write(unpacked=[*self.unpacked, relative])
+
+    def end(self) -> None:
+        self.path.unlink(missing_ok=True)
+
+    def _write(self, **values: Any) -> None:
+        self.record = {**self.record, **values}
+        write_json(self.path, self.record)
