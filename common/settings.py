@@ -87,6 +87,15 @@ class Settings:
         """What the file says of a scene or, where it does not name it, the catalogue (`mipnerf360/room`)."""
         return self.scenes.get(scene) or _of_catalogue(scene)
 
+    def folder_of(self, entry: SceneEntry) -> Path | None:
+        """Where a scene should lie; None where that is below data.root, which is not set."""
+        if entry.path.startswith("package:"):
+            return PACKAGE / entry.path.removeprefix("package:")
+        path = Path(entry.path).expanduser()
+        if path.is_absolute():
+            return path
+        return Path(self.data.root).expanduser() / path if self.data.root else None
+
     def dataset_of(self, scene: str, otherwise: str) -> str:
         """The group that tables put a scene in; `otherwise` where the file names none."""
         entry = self.entry(scene)

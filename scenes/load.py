@@ -10,7 +10,6 @@ from ..common.settings import SceneEntry, Settings
 from .splits import hold_out
 from .types import Scene
 from .validate import check_scene
-from .whereabouts import absence, folder_of  # no source: where a scene lies; what is read there counts
 
 FORMATS = "scenes.formats"
 
@@ -55,10 +54,12 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
             f"no folder and no scene of {settings.source} is called '{name}'{nearest(name, known)} "
             f"(scenes: {', '.join(known)})"
         )
-    absent = absence([name], settings)
-    if absent:
-        raise UserError(absent)
-    return folder_of(entry, settings)
+    folder = settings.folder_of(entry)
+    if folder is None or not folder.exists():
+        from .whereabouts import absence  # no source: it says what is missing
+
+        raise UserError(absence([name], settings) or f"scene '{name}' is not in '{folder}'")
+    return folder
 
 
 def detect(root: Path) -> str:

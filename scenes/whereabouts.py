@@ -1,17 +1,10 @@
-"""Where a scene that has a name should lie, and the line that brings those that are not there."""
+"""What to say of scenes that have a name and are not where they should be, with the line that brings them."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
 from ..common import catalogue
-from ..common.settings import PACKAGE, SceneEntry, Settings
-
-
-def folder_of(entry: SceneEntry, settings: Settings) -> Path:
-    """The folder of an entry of environment.toml or the catalogue; a relative path where data.root is not set."""
-    if entry.path.startswith("package:"):
-        return PACKAGE / entry.path.removeprefix("package:")
-    return Path(settings.data.root).expanduser() / Path(entry.path).expanduser()
+from ..common.settings import SceneEntry, Settings
 
 
 def absence(names: Iterable[str], settings: Settings) -> str | None:
@@ -20,30 +13,27 @@ def absence(names: Iterable[str], settings: Settings) -> str | None:
     It has the command that downloads those that the catalogue knows. Names that nobody knows are left to others.
     """
     known = {name: entry for name in names if (entry := settings.entry(name)) is not None}
-    needs_root = {name for name, entry in known.items() if _is_relative(entry)}
-    unset = [name for name in known if name in needs_root and not settings.data.root]
-    absent = unset or [name for name, entry in known.items() if not folder_of(entry, settings).exists()]
+    folders = {name: settings.folder_of(entry) for name, entry in known.items()}
+    unset = [name for name, folder in folders.items() if folder is None]
+    absent = unset or [name for name, folder in folders.items() if folder is not None and not folder.exists()]
     if not absent:
         return None
-    first, others = absent[0], absent[1:]
-    also = f", nor are {', '.join(others)}" if others else ""
-    command = _command([name for name in absent if name in needs_root], known)
+    first, others = absent[0], ", ".join(absent[1:])
+    command, them = _command(absent, known), "them" if others else "it"
     if unset:
-        how = f", and `{command}` brings {'them' if others else 'it'}" if command else ""
-        also = f", as are {', '.join(others)}" if others else ""
-        return (
-            f"scene '{first}' is below data.root, which is not set{also}; set VIEWBENCH_DATA or data.root to the folder "
-            f"of your captures{how}"
-        )
-    how = f"`{command}` brings {'them' if others else 'it'}, or correct" if command else "correct"
-    folder = folder_of(known[first], settings)
-    return f"scene '{first}' should be in '{folder}', which is not there{also}; {how} data.root or its path"
-
-
-def _is_relative(entry: SceneEntry) -> bool:
-    return not entry.path.startswith("package:") and not Path(entry.path).expanduser().is_absolute()
+        also = f", as are {others}" if others else ""
+        brings = f"; `{command}` then brings {them}" if command else ""
+        return f"scene '{first}' is below data.root, which is not set{also}; set VIEWBENCH_DATA or data.root{brings}"
+    also = f", nor are {others}" if others else ""
+    how = f"`{command}` brings {them}, or correct" if command else "correct"
+    return f"scene '{first}' should be in '{folders[first]}', which is not there{also}; {how} data.root or its path"
 
 
 def _command(names: list[str], known: dict[str, SceneEntry]) -> str:
-    found = [scene for name in names if (scene := catalogue.find(name) or catalogue.at(known[name].path))]
+    """The line that downloads those that lie where the catalogue has a scene."""
+    found = [scene for name in names if (scene := _listed(known[name].path)) is not None]
     return catalogue.command(found) if found else ""
+
+
+def _listed(path: str) -> catalogue.Listed | None:
+    return None if Path(path).is_absolute() else catalogue.at(path)

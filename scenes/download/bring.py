@@ -18,7 +18,7 @@ from .hashes import Hashes
 from .http import Patience, kind_of
 from .ranges import ChangedError, NoRangesError, RangeFile
 from .room import check_room
-from .unpack import damaged, extract, extract_tar, is_right, members, spans, unpack_nested
+from .unpack import DamagedError, damaged, extract, extract_tar, is_right, members, spans, unpack_nested
 from .whole import download
 
 RECEIPT = "download.json"  # in the scene's folder: what it was made from, and what belongs to it
@@ -113,7 +113,13 @@ def _zip(scene: Listed, archive: Archive, staging: Path, state: "_State", place:
     if not path.is_file():
         words = size_in_words(archive.bytes, archive.about_gb) or "size not known"
         place.say(f"the server gives no parts of '{archive.address}': the whole archive ({words}) is fetched")
-    made_from = _whole(archive, path, scene, place) | _members(scene, archive, path, staging, state, place)
+    made_from = _whole(archive, path, scene, place)
+    try:
+        made_from |= _members(scene, archive, path, staging, state, place)
+    except DamagedError:
+        path.unlink()
+        raise
+    place.hashes.check(archive.address, "file", made_from["sha256"])
     if scene.shared == 1:
         path.unlink()
     else:
@@ -169,12 +175,13 @@ def _tar(scene: Listed, archive: Archive, staging: Path, place: Place) -> dict[s
     except UserError:
         path.unlink()  # it is not what it should be, and would not be the next time
         raise
+    place.hashes.check(archive.address, "file", made_from["sha256"])
     path.unlink()
     return made_from
 
 
 def _whole(archive: Archive, path: Path, scene: Listed, place: Place) -> dict[str, Any]:
-    """Downloads the archive unless it is there, and checks its hash."""
+    """Downloads the archive unless it is there, and compares its hash with what is known."""
     if not path.is_file():
         check_room(path.parent, archive.bytes or int(archive.about_gb * 1e9))
 
@@ -184,10 +191,7 @@ def _whole(archive: Archive, path: Path, scene: Listed, place: Place) -> dict[st
         download(archive.address, path, place.patience, progress, place.say)
     sha256 = sha256_file(path)
     try:
-        if kind_of(path.name) == "zip":
-            with damaged(archive.address), zipfile.ZipFile(path):
-                pass  # it has a directory, so that what is recorded now is an archive
-        place.hashes.check(archive.address, "file", sha256)
+        place.hashes.check(archive.address, "file", sha256, record=False)
     except UserError:
         path.unlink()
         raise

@@ -70,26 +70,41 @@ def _unpacked(scene: Listed, name: str, identity: str, staging: Path, place: "Pl
     if not path.is_file():
         _fetch(identity, path, place, by_hand, scene.name)
     sha256 = sha256_file(path)
+    address = f"https://drive.google.com/file/d/{identity}"
     try:
-        place.hashes.check(f"https://drive.google.com/file/d/{identity}", "file", sha256)
+        place.hashes.check(address, "file", sha256, record=False)
+        _take(scene, name, path, staging)
     except UserError:
         path.unlink()
         raise
-    alone = PurePosixPath(name).name.lower().startswith(scene.scene + ".")
+    place.hashes.check(address, "file", sha256)
+    if _is_alone(scene, name):
+        path.unlink()
+    else:
+        place.say(f"the archive is kept for its other scenes in '{path}'; remove it when you need none of them")
+    return {"sha256": sha256}
+
+
+def _is_alone(scene: Listed, name: str) -> bool:
+    """Whether the archive is called like the scene, and not like the data set."""
+    return PurePosixPath(name).name.lower().startswith(scene.scene + ".")
+
+
+def _take(scene: Listed, name: str, path: Path, staging: Path) -> None:
+    """Unpacks the scene; an archive that is called like it may have its files without a folder."""
     if kind_of(name) == "zip":
         with damaged(name), zipfile.ZipFile(path) as archive:
             names = [info.filename for info in archive.infolist()]
-            prefix = "" if alone and not any(f"/{scene.prefix}" in f"/{member}" for member in names) else scene.prefix
+            prefix = (
+                ""
+                if _is_alone(scene, name) and not any(f"/{scene.prefix}" in f"/{member}" for member in names)
+                else scene.prefix
+            )
             chosen = members(archive, prefix, scene.also, name)
             missing = {at: info for at, info in chosen.items() if not is_right(staging / at, info)}
             extract(archive, missing, staging, name, lambda count: None)
     else:
         extract_tar(path, scene.prefix, scene.also, staging, name, lambda count: None)
-    if alone:
-        path.unlink()
-    else:
-        place.say(f"the archive is kept for its other scenes in '{path}'; remove it when you need none of them")
-    return {"sha256": sha256}
 
 
 def _fetch(identity: str, target: Path, place: "Place", by_hand: str, text: str = "") -> None:

@@ -128,11 +128,25 @@ def _words(error: BaseException) -> str:
 
 
 def read(response: Any, count: int) -> bytes:
-    """At most `count` bytes of the body, none at its end. Raises TemporaryError where the connection breaks off."""
+    """At most `count` bytes of the body, as they come, none at its end.
+
+    Raises TemporaryError where the connection breaks off, and what came before is not lost with it.
+    """
     try:
-        return response.read(count)
+        return response.read1(count)
     except (OSError, http.client.HTTPException, ValueError) as error:
         raise TemporaryError(_words(error)) from None
+
+
+def head(response: Any, count: int) -> bytes:
+    """The first `count` bytes of the body, fewer where it is shorter. Raises TemporaryError where it breaks off."""
+    found = b""
+    while len(found) < count and (piece := read(response, count - len(found))):
+        found += piece
+    announced = length_of(response)
+    if announced is not None and len(found) < min(count, announced):
+        raise TemporaryError("the server closed the connection early")
+    return found
 
 
 @contextlib.contextmanager

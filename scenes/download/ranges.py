@@ -15,6 +15,7 @@ from .http import (
     ask,
     check_signature,
     closing,
+    head,
     if_range,
     range_of,
     read,
@@ -62,7 +63,7 @@ class RangeFile(io.RawIOBase):
                     if response.status == 416:
                         raise UserError(f"'{self.address}' is empty; it is not what the catalogue means")
                     if part is None or part.first == 0:
-                        check_signature(read(response, 4096 if part is None else 8), self.address, kind)
+                        check_signature(head(response, 4096 if part is None else 8), self.address, kind)
                     if part is None or part.first != 0 or part.total is None:
                         raise NoRangesError
                     self.size, self.validators = part.total, validators(response)

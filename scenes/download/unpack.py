@@ -19,6 +19,11 @@ LEFT_OUT = ("__MACOSX", ".DS_Store", "Thumbs.db")  # what systems leave in archi
 ENCRYPTED = 1  # bit of a zip member's flags
 DEEPEST = 3  # archives within archives
 
+
+class DamagedError(UserError):
+    """What came is not the archive that it was."""
+
+
 Done = Callable[[int], None]  # is told the bytes of each piece that is written or found right
 
 
@@ -119,10 +124,10 @@ def damaged(name: str, member: str = "") -> Iterator[None]:
     try:
         yield
     except NotImplementedError as error:
-        raise UserError(f"archive '{name}' is packed in a way that Python does not know: {error}") from None
+        raise DamagedError(f"archive '{name}' is packed in a way that Python does not know: {error}") from None
     except (zipfile.BadZipFile, tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError, RuntimeError) as error:
         where = f" at '{member}'" if member else ""
-        raise UserError(f"archive '{name}' is damaged{where}: {error}") from None
+        raise DamagedError(f"archive '{name}' is damaged{where}: {error}") from None
 
 
 def extract_tar(path: Path, prefix: str, also: tuple[str, ...], folder: Path, name: str, done: Done) -> None:

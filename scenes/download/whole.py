@@ -17,6 +17,7 @@ from .http import (
     ask,
     check_signature,
     closing,
+    head,
     if_range,
     kind_of,
     length_of,
@@ -27,6 +28,7 @@ from .http import (
 )
 from .room import check_room
 
+HEAD = 4096  # bytes by which an archive is told from a web page
 RESTARTS = 3  # times that a file may become another one while it is fetched
 
 
@@ -53,8 +55,9 @@ def download(address: str, target: Path, patience: Patience, progress: Progress,
         if restarts > RESTARTS:
             raise UserError(f"'{address}' becomes another file again and again while it is fetched; try later")
         size = part.stat().st_size if part.exists() else 0
-        if not restarted and size <= best:
-            tries.failure(TemporaryError(f"the server announces more than the {size} bytes that it sends"))
+        if not restarted:
+            short = f"the server announces more than the {size} bytes that it sends"
+            tries.failure(TemporaryError("the server closed the connection early" if size > best else short))
     part.replace(target)
     note.unlink(missing_ok=True)
 
@@ -113,7 +116,7 @@ def _once(
             say(f"'{address}' is not what it was, or the server gives other parts than asked: it is fetched anew")
             part.unlink(missing_ok=True)
             return False, True
-        first = read(response, CHUNK)
+        first = head(response, HEAD) if not goes_on else read(response, CHUNK)
         if not have or not goes_on:
             check_signature(first, address, kind)
         if have and not goes_on:
