@@ -95,12 +95,8 @@ def _take(scene: Listed, name: str, path: Path, staging: Path) -> None:
     if kind_of(name) == "zip":
         with damaged(name), zipfile.ZipFile(path) as archive:
             names = [info.filename for info in archive.infolist()]
-            prefix = (
-                ""
-                if _is_alone(scene, name) and not any(f"/{scene.prefix}" in f"/{member}" for member in names)
-                else scene.prefix
-            )
-            chosen = members(archive, prefix, scene.also, name)
+            bare = _is_alone(scene, name) and not any(f"/{scene.prefix}" in f"/{member}" for member in names)
+            chosen = members(archive, "" if bare else scene.prefix, scene.also, name)
             missing = {at: info for at, info in chosen.items() if not is_right(staging / at, info)}
             extract(archive, missing, staging, name, lambda count: None)
     else:

@@ -241,8 +241,9 @@ def test_what_was_left_half_written_or_damaged_is_fetched_again(server, large, f
     served.faults = [("", 0), ("", 0), ("break", 150_000)]
     with pytest.raises(UserError):
         fetch(scene, patience=ONCE)
-    there = [path for path in (fetch.root / "set" / ".part-room").rglob("*.jpg") if path.stat().st_size]
-    there[0].write_bytes(there[0].read_bytes()[::-1])  # the same length
+    there = contents(fetch.root / "set" / ".part-room")
+    whole = next(name for name, data in there.items() if data and data == capture[name])
+    (fetch.root / "set" / ".part-room" / whole).write_bytes(there[whole][::-1])  # the same length
     assert contents(fetch(scene)) == capture
 
 
@@ -260,7 +261,8 @@ def test_another_archive_between_two_calls_leaves_nothing_of_the_first(server, l
     served.faults = [("", 0), ("", 0), ("break", 300_000)]
     with pytest.raises(UserError):
         fetch(scene, patience=ONCE)
-    fewer = dict(list(capture.items())[3:])
+    fewer = {name: data for name, data in capture.items() if not name.endswith("0000.jpg")}
+    assert fewer != capture
     served.data, served.etag = packed({"room": fewer}), '"2"'
     assert contents(fetch(scene)) == fewer
 
@@ -344,7 +346,7 @@ def seven(server, listed):
     eye = "\n".join(" ".join(f"{float(i == j)}" for j in range(4)) for i in range(4))
     inner = {}
     for number in (1, 2):
-        files = other_scene(number, 2, 80_000)
+        files = other_scene(number, 2, 400_000)
         frames = {f"frame-{i:06d}.color.png": data for i, data in enumerate(files.values())}
         frames |= {f"frame-{i:06d}.pose.txt": eye.encode() for i in range(2)}
         inner[f"seq-{number:02d}"] = frames
@@ -365,8 +367,7 @@ def test_archives_in_the_archive_are_unpacked(server, seven, fetch):
 
 def test_an_archive_in_the_archive_is_not_fetched_twice(server, seven, fetch):
     scene, served, wanted = seven
-    served.faults = [("", 0), ("break", 200_000)]
-    served.data = served.data + b""
+    served.faults = [("", 0), ("", 0), ("break", 900_000)]
     with zipfile.ZipFile(io.BytesIO(served.data)) as archive:
         second = archive.getinfo("chess/seq-02.zip")
     with pytest.raises(UserError):
@@ -375,8 +376,7 @@ def test_an_archive_in_the_archive_is_not_fetched_twice(server, seven, fetch):
     assert "seq-01" in there
     before = server.sent("/chess.zip")
     assert {name for name in contents(fetch(scene)) if name.startswith("seq")} == set(wanted)
-    # Small as it is, the archive is all tail: what is read of it lies in one request at most, twice at most.
-    assert server.sent("/chess.zip") - before < second.file_size * 2 + TAIL
+    assert server.sent("/chess.zip") - before < second.file_size + TAIL + 20_000 < len(served.data)
 
 
 # Whole files
@@ -390,11 +390,10 @@ def test_a_tgz_is_fetched_checked_and_unpacked(server, single, fetch, capture):
 
 def test_a_tgz_goes_on_in_this_call_and_in_the_next(server, single, fetch, capture):
     scene, served = single
-    served.faults = [("break", 100_000), ("break", 30_000)]
+    served.faults = [("break", 100_000), ("break", 30_000), ("break", 1)]
     with pytest.raises(UserError, match="the same command goes on"):
-        fetch(scene, patience=http.Patience(5, 1, 0))
-    fetched = server.sent("/room.tgz")
-    assert 0 < fetched <= 100_000
+        fetch(scene, patience=ONCE)
+    assert server.sent("/room.tgz") == 100_000
     assert contents(fetch(scene)) == capture
     later = server.of("/room.tgz")[1:]
     assert [asked.if_range for asked in later] == [served.etag] * len(later)
