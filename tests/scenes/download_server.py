@@ -19,6 +19,7 @@ class Served:
     etag: str = '"1"'
     ranges: bool = True
     modified: str = ""
+    headers: dict[str, str] = field(default_factory=dict)
     faults: list[tuple] = field(default_factory=list)
     always: tuple | None = None
 
@@ -48,6 +49,10 @@ class Server:
 
             def do_GET(self) -> None:
                 server._answer(self)
+
+            def end_headers(self) -> None:
+                self.send_header("Connection", "close")
+                super().end_headers()
 
             def log_message(self, format: str, *args: Any) -> None:
                 pass
@@ -133,6 +138,8 @@ class Server:
         else:
             body = data
             handler.send_response(200)
+        for name, text in served.headers.items():
+            handler.send_header(name, text)
         if served.etag:
             handler.send_header("ETag", served.etag)
         if served.modified:

@@ -1,15 +1,21 @@
-"""List scenes, formats, selectors, encoders, backends, reports or studies."""
+"""List scenes, data sets, formats, selectors, encoders, backends, reports or studies."""
 
 import click
 
-KINDS = ("scenes", "formats", "selectors", "encoders", "backends", "reports", "studies")
+KINDS = ("scenes", "datasets", "formats", "selectors", "encoders", "backends", "reports", "studies")
 
 
 @click.command()
 @click.argument("kind", type=click.Choice(KINDS))
 def command(kind: str) -> None:
     """Print what there is of KIND, one line each, and why something is unavailable."""
-    special = {"scenes": _scenes, "backends": _backends, "reports": _reports, "studies": _studies}
+    special = {
+        "scenes": _scenes,
+        "datasets": _datasets,
+        "backends": _backends,
+        "reports": _reports,
+        "studies": _studies,
+    }
     rows = special.get(kind, lambda: _plugins(kind))()
     width = max((len(name) for name, _ in rows), default=0)
     for name, text in rows:
@@ -49,6 +55,18 @@ def _scenes() -> list[tuple[str, str]]:
         except UserError as error:
             text = f"[unavailable: {error}]"
         rows.append((name, text))
+    return rows
+
+
+def _datasets() -> list[tuple[str, str]]:
+    from ...common import catalogue
+
+    rows = []
+    for data in catalogue.read().values():
+        scenes = (
+            f"{len(data.scenes)} scenes, {data.size}" if data.scenes else "[unavailable: given by its authors only]"
+        )
+        rows.append((data.name, f"{data.title}: {scenes}, licence: {data.licence.name} ({data.home})"))
     return rows
 
 
