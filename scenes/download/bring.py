@@ -19,7 +19,7 @@ from .http import Patience, kind_of
 from .ranges import ChangedError, NoRangesError, RangeFile
 from .room import check_room
 from .unpack import DamagedError, damaged, extract, extract_tar, is_right, members, spans, unpack_nested
-from .whole import download
+from .whole import Download
 
 RECEIPT = "download.json"  # in the scene's folder: what it was made from, and what belongs to it
 RESTARTS = 3  # times that an archive may become another one while it is read
@@ -99,9 +99,11 @@ def bring(scene: Listed, data: DataSet, place: Place, force: bool = False) -> Pa
 
 def _zip(scene: Listed, archive: Archive, staging: Path, state: "_State", place: Place) -> dict[str, Any]:
     """Parts of the archive where the server gives them, else all of it."""
-    for _ in range(RESTARTS):
+    for attempt in range(RESTARTS):
         try:
             with contextlib.closing(RangeFile(archive.address, "zip", place.patience)) as remote:
+                if attempt and state.directory == _remote_directory(remote):
+                    remote.validators = {}  # of machines that share the work each has an ETag of its own
                 return _members(scene, archive, remote, staging, state, place)
         except ChangedError:
             place.say(f"'{archive.address}' has changed while it was read: begun anew")
@@ -188,7 +190,8 @@ def _whole(archive: Archive, path: Path, scene: Listed, place: Place) -> dict[st
         def progress(done: int, total: int | None) -> None:
             place.progress(done, total, scene.name)
 
-        download(archive.address, path, place.patience, progress, place.say)
+        room = 1 + 1 / scene.shared  # pictures are hardly smaller in an archive
+        Download(archive.address, path, place.patience, progress, place.say, room).run()
     sha256 = sha256_file(path)
     try:
         place.hashes.check(archive.address, "file", sha256, record=False)
@@ -202,6 +205,12 @@ def _directory_sha256(archive: zipfile.ZipFile) -> str:
     """One hash of the names, lengths and CRC-32s of all members."""
     lines = (f"{info.CRC:08x} {info.file_size} {info.filename}\n" for info in archive.infolist())
     return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def _remote_directory(remote: RangeFile) -> str | None:
+    with contextlib.suppress(zipfile.BadZipFile), zipfile.ZipFile(remote) as archive:
+        return _directory_sha256(archive)
+    return None
 
 
 def _bytes(infos: dict[str, zipfile.ZipInfo]) -> int:
@@ -266,6 +275,11 @@ class _State:
         with contextlib.suppress(UserError):
             record = read_json(path) if path.is_file() else {}
         self.record: dict[str, Any] = record if isinstance(record, dict) else {}
+
+    @property
+    def directory(self) -> str | None:
+        """The hash of the archive that it is from."""
+        return self.record.get("directory")
 
     @property
     def unpacked(self) -> list[str]:

@@ -1,6 +1,8 @@
 """Download scenes of the field's data sets, by name."""
 
+import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +12,7 @@ from . import _options
 
 if TYPE_CHECKING:
     from ...common.catalogue import DataSet, Listed
+    from ...scenes.download.bring import Progress
 
 
 @click.command()
@@ -57,9 +60,8 @@ def command(names: tuple[str, ...], folder: Path | None, listing: bool, accept_l
     except KeyboardInterrupt:
         click.echo("\nviewbench: what came is kept; the same command goes on from there", err=True)
         raise
-    named = scenes[0].name if folder is None else str(root / scenes[0].path)
-    short = scenes[0].scene
-    click.echo(f"viewbench: next: viewbench select {named} --ratio 0.1 --out {short}_tenth", err=True)
+    named = scenes[0].name if folder is None else shlex.quote(str(root / scenes[0].path))
+    click.echo(f"viewbench: next: viewbench select {named} --ratio 0.1 --out {scenes[0].scene}_tenth", err=True)
 
 
 def _consent(data: "DataSet", scenes: "list[Listed]", accepted: bool) -> None:
@@ -104,14 +106,15 @@ def _list(names: tuple[str, ...], root: Path | None) -> None:
             click.echo(f"  {data.by_hand} goes to data.root/{data.name}/SCENE")
 
 
-def _progress():
+def _progress() -> "Progress":
     """A line of progress a scene, in megabytes."""
-    shown: dict[str, object] = {}
+    shown: dict[str, Callable[[int, int | None], None]] = {}
 
     def update(done: int, total: int | None, text: str) -> None:
         unit = 1 if text.endswith(", files") else 1_000_000
         if text not in shown:
             shown[text] = _options.progress(text if unit == 1 else f"{text}, MB")
-        shown[text](done // unit, None if total is None else -(-total // unit))  # pyright: ignore[reportCallIssue]
+        units = None if total is None else -(-total // unit)
+        shown[text](units if units is not None and done >= (total or 0) else done // unit, units)
 
     return update
