@@ -144,6 +144,11 @@ def _dataset(name: str, values: dict[str, Any]) -> DataSet:
     return DataSet(name=name, licence=licence, scenes=scenes, **{"group": name, **values})
 
 
+def names() -> list[str]:
+    """DATASET/SCENE of all scenes."""
+    return [scene.name for known in read().values() for scene in known.scenes.values()]
+
+
 def find(name: str) -> Listed | None:
     """The scene that is called DATASET/SCENE, or in a study DATASET.SCENE; None for any other name."""
     for mark in "/.":
@@ -169,9 +174,11 @@ def expand(name: str) -> list[Listed]:
     dataset, _, scene = name.strip("/").partition("/")
     known = read().get(dataset)
     if known is None:
-        names = [*read(), *(listed.name for entry in read().values() for listed in entry.scenes.values())]
+        listed = [scene for entry in read().values() for scene in entry.scenes.values()]
+        same = [scene.name for scene in listed if scene.scene == name]
+        hint = f"; did you mean {' or '.join(same)}?" if same else nearest(name, [*read(), *names()])
         raise UserError(
-            f"no data set is called '{dataset}'{nearest(name, names)} (there are: {', '.join(read())}; "
+            f"no data set is called '{dataset}'{hint} (there are: {', '.join(read())}; "
             "`viewbench download --list` says more)"
         )
     if not known.scenes:

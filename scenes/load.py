@@ -49,9 +49,12 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
     if entry is None:
         if os.path.exists(name):  # noqa: PTH110
             return Path(name)
+        from ..common import catalogue  # no source: names to offer
+
         known = list(settings.scenes)
         raise UserError(
-            f"no folder and no scene of {settings.source} is called '{name}'{nearest(name, known)} "
+            f"no folder and no scene of {settings.source} is called '{name}'"
+            f"{nearest(name, [*known, *catalogue.names()])} "
             f"(scenes: {', '.join(known)})"
         )
     folder = settings.folder_of(entry)

@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import shutil
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,16 +12,17 @@ from typing import Any
 from ...common import plugins
 from ...common.catalogue import Archive, DataSet, Listed, size_in_words
 from ...common.errors import UserError
-from ...common.files import read_json, sha256_file, write_json
+from ...common.files import sha256_file
 from . import drive
 from .hashes import Hashes
 from .http import Patience, kind_of
 from .ranges import ChangedError, NoRangesError, RangeFile
+from .receipt import is_there, publish
 from .room import check_room
+from .unfinished import State, alone
 from .unpack import DamagedError, damaged, extract, extract_tar, is_right, members, spans, unpack_nested
 from .whole import Download
 
-RECEIPT = "download.json"  # in the scene's folder: what it was made from, and what belongs to it
 RESTARTS = 3  # times that an archive may become another one while it is read
 
 Progress = Callable[[int, int | None, str], None]  # bytes that are there, of how many, of what
@@ -47,28 +48,6 @@ class Place:
         return self.root / ".viewbench" / "archives" / f"{mark}-{name}"
 
 
-def is_there(scene: Listed, data: DataSet, root: Path) -> bool:
-    """Whether the scene is there and complete.
-
-    Raises UserError where a folder is there that is neither what was downloaded nor a capture that was put there by
-    hand.
-    """
-    folder = root / scene.path
-    if not folder.exists():
-        return False
-    if (folder / RECEIPT).is_file():
-        files = read_json(folder / RECEIPT, "receipt").get("files", {})
-        wrong = [name for name, size in files.items() if _size(folder / name) != size]
-        if wrong:
-            raise UserError(
-                f"'{folder}' is there, but {len(wrong)} of its {len(files)} files are missing or changed, such as "
-                f"'{wrong[0]}'; --force fetches it again"
-            )
-    elif not plugins.load("scenes.formats", data.format).detect(folder):
-        raise UserError(f"'{folder}' is there, and is no {data.format} capture; remove it, or --force replaces it")
-    return True
-
-
 def bring(scene: Listed, data: DataSet, place: Place, force: bool = False) -> Path:
     """The scene's folder, which is fetched unless it is there; with `force` again.
 
@@ -76,11 +55,11 @@ def bring(scene: Listed, data: DataSet, place: Place, force: bool = False) -> Pa
     beside the folder, and a later call goes on from it.
     """
     folder = place.root / scene.path
-    with _alone(scene, place.root):
+    with alone(place.root, scene.name):
         if not force and is_there(scene, data, place.root):
             return folder
         staging = folder.with_name(f".part-{folder.name}")
-        state = _State(place.root / ".viewbench" / "state" / f"{scene.name.replace('/', '+')}.json", staging)
+        state = State(place.root / ".viewbench" / "state" / f"{scene.name.replace('/', '+')}.json", staging)
         state.begin(force)
         if scene.archive is None:
             made_from = drive.bring(scene, data, staging, folder, place)
@@ -92,12 +71,12 @@ def bring(scene: Listed, data: DataSet, place: Place, force: bool = False) -> Pa
             raise UserError(
                 f"'{staging}' has what the archive calls '{scene.prefix}', which is no {data.format} capture"
             )
-        _publish(scene, data, staging, folder, made_from)
+        publish(scene, data, staging, folder, made_from)
         state.end()
     return folder
 
 
-def _zip(scene: Listed, archive: Archive, staging: Path, state: "_State", place: Place) -> dict[str, Any]:
+def _zip(scene: Listed, archive: Archive, staging: Path, state: State, place: Place) -> dict[str, Any]:
     """Parts of the archive where the server gives them, else all of it."""
     for attempt in range(RESTARTS):
         try:
@@ -130,7 +109,7 @@ def _zip(scene: Listed, archive: Archive, staging: Path, state: "_State", place:
 
 
 def _members(
-    scene: Listed, archive: Archive, source: RangeFile | Path, staging: Path, state: "_State", place: Place
+    scene: Listed, archive: Archive, source: RangeFile | Path, staging: Path, state: State, place: Place
 ) -> dict[str, Any]:
     """Takes the scene out of the archive: what is there and right is left alone."""
     name = archive.address
@@ -191,7 +170,8 @@ def _whole(archive: Archive, path: Path, scene: Listed, place: Place) -> dict[st
             place.progress(done, total, scene.name)
 
         room = 1 + 1 / scene.shared  # pictures are hardly smaller in an archive
-        Download(archive.address, path, place.patience, progress, place.say, room).run()
+        with alone(place.root, path.name):
+            Download(archive.address, path, place.patience, progress, place.say, room).run()
     sha256 = sha256_file(path)
     try:
         place.hashes.check(archive.address, "file", sha256, record=False)
@@ -217,41 +197,6 @@ def _bytes(infos: dict[str, zipfile.ZipInfo]) -> int:
     return sum(info.file_size for info in infos.values())
 
 
-def _publish(scene: Listed, data: DataSet, staging: Path, folder: Path, made_from: dict[str, Any]) -> None:
-    """Writes the receipt and renames the folder; an old one goes only then."""
-    address = scene.archive.address if scene.archive else f"https://drive.google.com/drive/folders/{data.drive}"
-    found = sorted(path for path in staging.rglob("*") if path.is_file())
-    files = {path.relative_to(staging).as_posix(): path.stat().st_size for path in found}
-    licence = {"name": data.licence.name, "address": data.licence.address}
-    record = {"schema": 1, "scene": scene.name, "address": address, **made_from, "licence": licence, "files": files}
-    write_json(staging / RECEIPT, record)
-    old = folder.with_name(f".old-{folder.name}")
-    shutil.rmtree(old, ignore_errors=True)
-    if folder.exists():
-        folder.replace(old)
-    staging.replace(folder)
-    shutil.rmtree(old, ignore_errors=True)
-
-
-def _size(path: Path) -> int | None:
-    return path.stat().st_size if path.is_file() else None
-
-
-@contextlib.contextmanager
-def _alone(scene: Listed, root: Path) -> Iterator[None]:
-    """Keeps a second call for the same scene out. Raises UserError in that one."""
-    import fcntl
-
-    path = root / ".viewbench" / "locks" / scene.name.replace("/", "+")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with open(path, "w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise UserError(f"{scene.name} is being downloaded by another call of viewbench; wait for it") from None
-        yield
-
-
 class _Count:
     """Adds up bytes for the line that shows progress."""
 
@@ -264,48 +209,3 @@ class _Count:
 
     def finish(self) -> None:
         self.progress(self.done, self.done, self.text)
-
-
-class _State:
-    """What is known of a scene that is half there."""
-
-    def __init__(self, path: Path, staging: Path):
-        self.path, self.staging = path, staging
-        record = {}
-        with contextlib.suppress(UserError):
-            record = read_json(path) if path.is_file() else {}
-        self.record: dict[str, Any] = record if isinstance(record, dict) else {}
-
-    @property
-    def directory(self) -> str | None:
-        """The hash of the archive that it is from."""
-        return self.record.get("directory")
-
-    @property
-    def unpacked(self) -> list[str]:
-        """Archives in the archive that are unpacked, and gone."""
-        return self.record.get("unpacked", [])
-
-    def begin(self, force: bool) -> None:
-        """Forgets what came unless it is of a call that wanted the same: --force begins anew once, and then goes on."""
-        if force and not self.record.get("force"):
-            shutil.rmtree(self.staging, ignore_errors=True)
-            self.record = {}
-        self._write(force=force or self.record.get("force", False))
-
-    def of(self, directory: str) -> None:
-        """Forgets what came from another archive than the one with this directory."""
-        if self.record.get("directory", directory) != directory:
-            shutil.rmtree(self.staging, ignore_errors=True)
-            self.record = {"force": self.record.get("force", False)}
-        self._write(directory=directory)
-
-    def has_unpacked(self, relative: str) -> None:
-        self._write(unpacked=[*self.unpacked, relative])
-
-    def end(self) -> None:
-        self.path.unlink(missing_ok=True)
-
-    def _write(self, **values: Any) -> None:
-        self.record = {**self.record, **values}
-        write_json(self.path, self.record)

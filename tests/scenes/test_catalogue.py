@@ -53,8 +53,8 @@ def test_a_scene_says_where_it_is_and_what_it_becomes(scene):
         safe(name, "catalogue")
     entry = SETTINGS.entry(scene.name)
     assert entry == settings_file.SceneEntry(scene.path, data.group, data.holdout, data.format)
-    assert catalogue.find(scene.name.replace("/", ".")) is scene
-    assert catalogue.at(scene.path) is scene
+    assert catalogue.find(scene.name.replace("/", ".")) == scene
+    assert catalogue.at(scene.path) == scene
     assert catalogue.expand(scene.name) == [scene]
     if data.format == "tum-rgbd":
         assert any(camera in scene.folder for camera in tum_rgbd.CAMERAS), "the reader knows the camera by the folder"
@@ -87,7 +87,9 @@ def test_the_scenes_that_studies_ship_with_can_be_brought(monkeypatch, tmp_path)
     [
         ("mipnerf360/rom", "has no scene 'rom'; did you mean 'room'"),
         ("mipnerf36", "no data set is called 'mipnerf36'; did you mean 'mipnerf360'"),
-        ("room", "no data set is called 'room'"),
+        ("room", "no data set is called 'room'; did you mean mipnerf360/room[?]"),
+        ("kitchen_1", "did you mean indoortraj/kitchen_1[?]"),
+        ("room1", "did you mean replica/room1 or indoortraj-replica/room1[?]"),
         ("scannet/scene0000_00", "signed agreement.* data.root/scannet/scene0000_00"),
         ("scannetpp", "kaldir.vc.in.tum.de/scannetpp"),
         ("", "no data set is called ''"),

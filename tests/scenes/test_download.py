@@ -19,9 +19,10 @@ from viewbench.common import catalogue
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.scenes.download import bring as bring_module
-from viewbench.scenes.download import http
+from viewbench.scenes.download import http, receipt
 from viewbench.scenes.download.bring import Place, bring
 from viewbench.scenes.download.ranges import GAP, TAIL
+from viewbench.scenes.download.unfinished import alone
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.subset import write_scene
 
@@ -100,7 +101,7 @@ def capture(small_room, tmp_path_factory):
 
 
 def contents(folder):
-    files = (path for path in folder.rglob("*") if path.is_file() and path.name != bring_module.RECEIPT)
+    files = (path for path in folder.rglob("*") if path.is_file() and path.name != receipt.RECEIPT)
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
@@ -163,9 +164,9 @@ def test_one_scene_of_a_large_archive_is_four_requests_and_not_the_rest(server, 
     assert len(server.asked) <= 4
     needed = sum(len(data) for data in capture.values())
     assert server.sent("/all.zip") < needed + TAIL + 20_000 < len(served.data) / 2
-    receipt = json.loads((folder / bring_module.RECEIPT).read_text(encoding="utf-8"))
-    assert receipt["scene"] == "set/room"
-    assert receipt["files"] == {name: len(data) for name, data in capture.items()}
+    record = json.loads((folder / receipt.RECEIPT).read_text(encoding="utf-8"))
+    assert record["scene"] == "set/room"
+    assert record["files"] == {name: len(data) for name, data in capture.items()}
     left = {path.name for path in fetch.root.rglob("*") if path.name.startswith((".part", ".old"))}
     assert left == set()
 
@@ -636,7 +637,7 @@ def test_a_full_disk_is_found_out_before(request, server, fetch, monkeypatch, wh
 
 
 def test_two_calls_at_once_do_not_meet(server, large, fetch):
-    with bring_module._alone(large[0], fetch.root), pytest.raises(UserError, match="by another call"):
+    with alone(fetch.root, "set/room"), pytest.raises(UserError, match="by another call"):
         fetch(large[0])
 
 

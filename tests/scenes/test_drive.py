@@ -3,6 +3,7 @@
 gdown then asks a server of ours in place of Google's: its own code reads the pages of a folder and of refused files.
 """
 
+import importlib.machinery
 import inspect
 import io
 import sys
@@ -120,7 +121,7 @@ def drive(request, server, tmp_path, monkeypatch):
     def fetch(files, scene="kitchen_1"):
         if request.param == "stand-in":
             fake = StandIn(files)
-            fake.__spec__ = types.SimpleNamespace()
+            fake.__spec__ = importlib.machinery.ModuleSpec("gdown", None)
             monkeypatch.setitem(sys.modules, "gdown", fake)
         else:
             pytest.importorskip("gdown")

@@ -82,6 +82,7 @@ def test_a_scene_is_brought_and_the_next_line_works(served, capsys, tmp_path):
     command = lines[-1].removeprefix("viewbench: next: viewbench ").split()
     status, out, _ = run(capsys, *command[:-1], tmp_path / command[-1], "--selector", "uniform")
     assert (status, len(out.split())) == (0, 1)
+    assert "set/one         12 training" in run(capsys, "list", "scenes")[1]
     asked = len(served.asked)
     status, out, err = run(capsys, "download", "set/one")
     assert (status, out) == (0, f"{folder}\n")
@@ -124,7 +125,7 @@ def test_without_consent_nothing_is_asked_of_the_server(served, capsys, monkeypa
         (["download", "signed"], "goes to data.root/signed/SCENE"),
         (["download", "--list", "sett"], "no data set is called 'sett'"),
         (["info", "set/one"], "`viewbench download set/one` brings it"),
-        (["info", "set/on"], "no folder and no scene of"),
+        (["info", "set/on"], "is called 'set/on'; did you mean 'set/one'"),
     ],
 )
 def test_a_mistake_is_one_line(served, capsys, arguments, words):

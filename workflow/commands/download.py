@@ -30,7 +30,8 @@ def command(names: tuple[str, ...], folder: Path | None, listing: bool, accept_l
     from ...common import catalogue
     from ...common import settings as settings_file
     from ...common.errors import UserError
-    from ...scenes.download.bring import Place, bring, is_there
+    from ...scenes.download.bring import Place, bring
+    from ...scenes.download.receipt import is_there
 
     settings = settings_file.load()
     root = folder or (Path(settings.data.root).expanduser() if settings.data.root else None)
@@ -108,7 +109,7 @@ def _list(names: tuple[str, ...], root: Path | None) -> None:
 
 def _progress() -> "Progress":
     """A line of progress a scene, in megabytes."""
-    shown: dict[str, Callable[[int, int | None], None]] = {}
+    shown: dict[str, Callable[..., None]] = {}
 
     def update(done: int, total: int | None, text: str) -> None:
         unit = 1 if text.endswith(", files") else 1_000_000

@@ -1,6 +1,11 @@
 """List scenes, data sets, formats, selectors, encoders, backends, reports or studies."""
 
+from typing import TYPE_CHECKING
+
 import click
+
+if TYPE_CHECKING:
+    from ...common.settings import SceneEntry, Settings
 
 KINDS = ("scenes", "datasets", "formats", "selectors", "encoders", "backends", "reports", "studies")
 
@@ -42,13 +47,15 @@ def _reports() -> list[tuple[str, str]]:
 
 
 def _scenes() -> list[tuple[str, str]]:
+    from ...common import catalogue
     from ...common import settings as settings_file
     from ...common.errors import UserError
     from ...scenes.load import open_scene
 
     settings = settings_file.load()
     rows = []
-    for name, entry in settings.scenes.items():
+    entries = {**{name: entry for name in catalogue.names() if (entry := _here(name, settings))}, **settings.scenes}
+    for name, entry in entries.items():
         try:
             scene = open_scene(name, settings)
             text = f"{len(scene.train)} training and {len(scene.test)} test views, {scene.format} ({entry.path})"
@@ -56,6 +63,14 @@ def _scenes() -> list[tuple[str, str]]:
             text = f"[unavailable: {error}]"
         rows.append((name, text))
     return rows
+
+
+def _here(name: str, settings: "Settings") -> "SceneEntry | None":
+    """What is known of a scene of the catalogue, where it is there and environment.toml has no name for it."""
+    entry = settings.entry(name)
+    folder = settings.folder_of(entry) if entry else None
+    named = any(other.path == entry.path for other in settings.scenes.values()) if entry else True
+    return entry if folder is not None and folder.exists() and not named else None
 
 
 def _datasets() -> list[tuple[str, str]]:
