@@ -51,6 +51,9 @@ def read(root: Path) -> Scene:
     every, points = _split(reconstruction, images, folder), _points(reconstruction, images)
     files, notes = [model], list(_others(model))
     details: dict[str, Any] = {"images": folder}
+    full = reconstruction.cameras[images[0].camera_id].width
+    if folder.name == "images" and full != every.cameras.width[0]:
+        notes.append(f"images are {every.cameras.width[0]} wide and their cameras {full}: cameras are scaled to them")
     test = _test_model(root, model)
     if test is not None:
         test_images = test[1]
@@ -149,10 +152,19 @@ def _split(reconstruction: Any, images: Sequence[Any], folder: Path) -> Split:
         distortion=values[:, 6:] if values[:, 6:].any() else None,
     )
     names = tuple(image.name for image in images)
-    if folder.name != "images":  # images_2, images_4, images_8: the model speaks of the full size
+    if folder.name != "images" or _shrunk(cameras, folder / names[0]):  # the model speaks of the full size
         cameras = cameras.scaled(image_size(folder / names[0])[0])
     lens = next((name for image in images if (name := _lens(reconstruction.cameras[image.camera_id]))), "")
     return Split(names, tuple(folder / name for name in names), cameras, lens=lens)
+
+
+def _shrunk(cameras: Cameras, image: Path) -> bool:
+    """Whether the picture is its camera's drawn smaller, as in the 3DGS authors' Tanks and Temples."""
+    try:
+        width, height = image_size(image)
+    except UserError:
+        return False  # whoever wants its pixels says what is wrong with it
+    return width < cameras.width[0] and int(cameras[0].scaled(width).height[0]) == height
 
 
 def _others(model: Path) -> tuple[str, ...]:
