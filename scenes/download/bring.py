@@ -47,6 +47,10 @@ class Place:
         mark = hashlib.sha256(address.encode()).hexdigest()[:8]
         return self.root / ".viewbench" / "archives" / f"{mark}-{name}"
 
+    def kept_archive(self, archive: Archive) -> Path:
+        """Likewise, by what the catalogue says of it."""
+        return self.kept(archive.address, Path(archive.address).name)
+
 
 def bring(scene: Listed, data: DataSet, place: Place, force: bool = False) -> Path:
     """The scene's folder, which is fetched unless it is there; with `force` again.
@@ -60,7 +64,8 @@ def bring(scene: Listed, data: DataSet, place: Place, force: bool = False) -> Pa
             return folder
         staging = folder.with_name(f".part-{folder.name}")
         state = State(place.root / ".viewbench" / "state" / f"{scene.name.replace('/', '+')}.json", staging)
-        state.begin(force)
+        if state.begin(force) and scene.archive is not None:
+            place.kept_archive(scene.archive).unlink(missing_ok=True)
         if scene.archive is None:
             made_from = drive.bring(scene, data, staging, folder, place)
         elif kind_of(scene.archive.address) == "zip":
@@ -90,7 +95,7 @@ def _zip(scene: Listed, archive: Archive, staging: Path, state: State, place: Pl
             break
     else:
         raise UserError(f"'{archive.address}' becomes another file again and again while it is read; try later")
-    path = place.kept(archive.address, Path(archive.address).name)
+    path = place.kept_archive(archive)
     if not path.is_file():
         words = size_in_words(archive.bytes, archive.about_gb) or "size not known"
         place.say(f"the server gives no parts of '{archive.address}': the whole archive ({words}) is fetched")
@@ -146,7 +151,7 @@ def _members(
 
 
 def _tar(scene: Listed, archive: Archive, staging: Path, place: Place) -> dict[str, Any]:
-    path = place.kept(archive.address, Path(archive.address).name)
+    path = place.kept_archive(archive)
     made_from = _whole(archive, path, scene, place)
     shutil.rmtree(staging, ignore_errors=True)
     staging.mkdir(parents=True)

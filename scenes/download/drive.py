@@ -21,7 +21,7 @@ def bring(scene: Listed, data: DataSet, staging: Path, folder: Path, place: "Pla
     Raises UserError for a folder without either, and where Google refuses, with what to do by hand.
     """
     extras.need("gdown")
-    by_hand = f"or by hand: {data.by_hand}, at '{folder}'"
+    by_hand = f"or by hand: {data.by_hand} at '{folder}'"
     listed = _ask(by_hand, data.drive, "download_folder", id=data.drive, skip_download=True)
     files = {str(item.path).replace("\\", "/"): str(item.id) for item in listed}
     place.say(f"{scene.name}: {len(files)} files are in the shared folder")

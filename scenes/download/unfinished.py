@@ -47,12 +47,17 @@ class State:
         """Archives in the archive that are unpacked, and gone."""
         return self.record.get("unpacked", [])
 
-    def begin(self, force: bool) -> None:
-        """Forgets what came unless it is of a call that wanted the same: --force begins anew once, and then goes on."""
-        if force and not self.record.get("force"):
+    def begin(self, force: bool) -> bool:
+        """Forgets what came unless it is of a call that wanted the same: --force begins anew once, and then goes on.
+
+        Returns whether it begins anew.
+        """
+        anew = force and not self.record.get("force")
+        if anew:
             shutil.rmtree(self.staging, ignore_errors=True)
             self.record = {}
         self._write(force=force or self.record.get("force", False))
+        return anew
 
     def of(self, directory: str) -> None:
         """Forgets what came from another archive than the one with this directory."""

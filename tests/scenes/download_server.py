@@ -2,10 +2,12 @@
 
 import contextlib
 import re
+import ssl
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from typing import Any
 
 PAGE = b"<!DOCTYPE html><html><head><title>Log in to  the network</title></head><body>no</body></html>"
@@ -37,7 +39,7 @@ class Asked:
 class Server:
     """Runs on a port of its own until `close`; `asked` is all that was asked of it."""
 
-    def __init__(self) -> None:
+    def __init__(self, certificate: Path | None = None) -> None:
         self.files: dict[str, Served] = {}
         self.asked: list[Asked] = []
         self.released = threading.Event()  # ends what stalls
@@ -59,6 +61,11 @@ class Server:
 
         self._http = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
         self._http.daemon_threads = True
+        self.scheme = "https" if certificate else "http"
+        if certificate:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(certificate)
+            self._http.socket = context.wrap_socket(self._http.socket, server_side=True)
         self.port = self._http.server_address[1]
         threading.Thread(target=self._http.serve_forever, args=(0.02,), daemon=True).start()
 
@@ -68,7 +75,7 @@ class Server:
         self._http.server_close()
 
     def url(self, path: str) -> str:
-        return f"http://127.0.0.1:{self.port}{path}"
+        return f"{self.scheme}://127.0.0.1:{self.port}{path}"
 
     def serve(self, path: str, data: bytes, **given: Any) -> Served:
         self.files[path] = Served(data, **given)

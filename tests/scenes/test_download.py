@@ -6,6 +6,7 @@ import json
 import os
 import random
 import shutil
+import subprocess
 import tarfile
 import urllib.request
 import zipfile
@@ -344,6 +345,43 @@ def test_what_is_no_capture_of_the_format_is_not_published(server, listed, fetch
     assert not (fetch.root / "set" / "room").exists()
 
 
+def test_a_directory_that_is_larger_than_the_tail_is_one_more_request(server, listed, fetch, capture):
+    many = {f"images/{i:05d}.jpg": b"" for i in range(4000)}
+    server.serve("/all.zip", packed({"room": capture, "other scene": many}))
+    text = f'archives = {{ all = {{ address = "{server.url("/all.zip")}" }} }}\n'
+    scene = listed(text + '[set.scenes]\nroom = { archive = "all", prefix = "room/" }')
+    assert contents(fetch(scene)) == capture
+    directory = server.asked[2]
+    assert directory.sent > TAIL
+    assert len(server.asked) == 4
+
+
+def test_an_archive_that_was_kept_is_used_and_by_force_fetched_again(server, large, fetch, capture):
+    scene, served = large
+    served.ranges = False
+    fetch(scene)
+    shutil.rmtree(fetch.root / "set")
+    assert contents(fetch(scene)) == capture
+    assert [asked.range for asked in server.asked[-1:]] == ["bytes=0-7"], "asked whether parts are given, no more"
+    changed = {**capture, "images/new.jpg": b"new"}
+    (fetch.root / ".viewbench" / "hashes.json").unlink()
+    served.data, served.etag = packed({"room": changed}), '"2"'
+    assert contents(fetch(scene, force=True)) == changed
+
+
+def test_a_call_by_force_that_broke_off_is_gone_on_with_too(server, large, fetch, capture):
+    scene, served = large
+    fetch(scene)
+    needed = sum(len(data) for data in capture.values())
+    served.faults = [("", 0), ("", 0), ("break", needed * 2 // 3)]
+    with pytest.raises(UserError):
+        fetch(scene, force=True, patience=ONCE)
+    assert contents(fetch.root / "set" / "room") == capture, "what is there stays until the new one is whole"
+    before = server.sent("/all.zip")
+    assert contents(fetch(scene, force=True)) == capture
+    assert server.sent("/all.zip") - before < needed
+
+
 # Archives within archives
 
 
@@ -534,6 +572,42 @@ def test_redirects_are_followed_but_not_out_of_encryption(server, single, large,
     with pytest.raises(UserError, match="not encrypted"):
         handler.redirect_request(request, None, 302, "Found", {}, "http://example.org/a.zip")
     assert handler.redirect_request(request, None, 302, "Found", {}, "https://example.org/b.zip") is not None
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory):
+    """A certificate of 127.0.0.1 that nobody has signed, with its key, in one file."""
+    folder = tmp_path_factory.mktemp("certificate")
+    command = "openssl req -x509 -newkey rsa:2048 -nodes -keyout key.pem -out cert.pem -days 2 -subj /CN=localhost"
+    try:
+        done = subprocess.run(
+            [*command.split(), "-addext", "subjectAltName=IP:127.0.0.1"], cwd=folder, capture_output=True
+        )
+    except FileNotFoundError:
+        pytest.skip("there is no openssl to make a certificate")
+    assert done.returncode == 0, done.stderr
+    (folder / "both.pem").write_bytes((folder / "key.pem").read_bytes() + (folder / "cert.pem").read_bytes())
+    return folder
+
+
+def test_encrypted_servers_are_reached_by_a_redirect_and_their_certificates_checked(
+    server, single, listed, fetch, capture, certificate, monkeypatch
+):
+    secure = Server(certificate / "both.pem")
+    try:
+        secure.files["/room.tgz"] = server.files["/room.tgz"]
+        address = secure.url("/room.tgz")
+        server.serve("/room.tgz", b"", always=("redirect", address))
+        with pytest.raises(UserError, match="certificate is not trusted"):
+            fetch(single[0])
+        monkeypatch.setenv("SSL_CERT_FILE", str(certificate / "cert.pem"))
+        assert contents(fetch(single[0])) == capture
+        secure.serve("/back.tgz", b"", always=("redirect", server.url("/room.tgz")))
+        scene = listed(f'[set.scenes.room]\naddress = "{secure.url("/back.tgz")}"\nprefix = "room/"')
+        with pytest.raises(UserError, match="not encrypted; not followed"):
+            fetch(scene, force=True)
+    finally:
+        secure.close()
 
 
 def test_a_proxy_is_used_where_there_is_one(server, listed, fetch, capture, monkeypatch):

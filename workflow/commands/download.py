@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 @click.argument("names", nargs=-1, metavar="DATASET[/SCENE]...")
 @click.option("--to", "folder", type=click.Path(path_type=Path, file_okay=False), help="Folder of captures; data.root.")
 @click.option("--list", "listing", is_flag=True, help="Print the data sets (of NAMES, if any) and stop.")
-@click.option("--accept-licence", is_flag=True, help="Accept the licences that are printed; for scripts.")
+@click.option(
+    "--accept-licence", "--accept-license", is_flag=True, help="Accept the licences that are printed; for scripts."
+)
 @click.option("--force", is_flag=True, help="Fetch again what is there.")
 def command(names: tuple[str, ...], folder: Path | None, listing: bool, accept_licence: bool, force: bool) -> None:
     """Download scenes by name, such as mipnerf360/room, or all scenes of a data set; print where they are.
@@ -77,7 +79,7 @@ def _consent(data: "DataSet", scenes: "list[Listed]", accepted: bool) -> None:
     click.echo(f"viewbench: to cite: {data.citation}", err=True)
     if accepted:
         return
-    if not sys.stdin.isatty():
+    if sys.stdin is None or not sys.stdin.isatty():
         raise UserError(
             f"the licence of {data.title} is to be accepted: read {licence.address}, and give --accept-licence"
         )
