@@ -39,10 +39,13 @@ def open_scene(
 
 
 def _entry(name: str, settings: Settings) -> SceneEntry | None:
-    """What is known of the name; a folder that is here comes before the catalogue, and after environment.toml."""
+    """What environment.toml says of the name, or the catalogue unless the name is another folder's than the scene's."""
     # os.path.exists, unlike Path.exists, takes any text for a name.
-    here = name not in settings.scenes and os.path.exists(name)  # noqa: PTH110
-    return None if here else settings.entry(name)
+    if name in settings.scenes or not os.path.exists(name):  # noqa: PTH110
+        return settings.entry(name)
+    entry = settings.entry(name)
+    folder = settings.folder_of(entry) if entry else None
+    return entry if folder is not None and folder.exists() and folder.samefile(name) else None
 
 
 def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:

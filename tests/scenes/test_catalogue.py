@@ -2,6 +2,7 @@
 
 import json
 import urllib.parse
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,12 @@ def test_the_scenes_that_studies_ship_with_can_be_brought(monkeypatch, tmp_path)
     scene = catalogue.at(entry.path)
     assert scene is not None
     assert scene.name == "indoortraj/kitchen_1"
+
+
+def test_it_is_in_the_wheel(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        for file in (catalogue.FILE, hashes.SHIPPED):
+            assert archive.read(f"viewbench/scenes/{file.name}") == file.read_bytes()
 
 
 @pytest.mark.parametrize(

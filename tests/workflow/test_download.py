@@ -19,6 +19,7 @@ from viewbench.common.settings import PACKAGE, Settings
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.subset import write_scene
 from viewbench.workflow.commands import _main
+from viewbench.workflow.commands import run as run_command
 
 TEXT = """
 [set]
@@ -214,15 +215,25 @@ def study(served, tmp_path):
     return tmp_path / "mine.yaml"
 
 
+def test_jobs_in_another_folder_have_the_same_catalogue(monkeypatch, tmp_path):
+    assert run_command.CATALOGUE == catalogue.VARIABLE
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(catalogue.VARIABLE, "mine.toml")
+    assert run_command.environment(Settings(Path("environment.toml")))[catalogue.VARIABLE] == str(
+        tmp_path / "mine.toml"
+    )
+
+
 def test_a_study_names_scenes_of_the_catalogue(study, capsys):
     status, out, err = run(capsys, "study", study)
     assert (status, err) == (0, "")
     assert "set.one" in out
-    STUDY_TYPO = {**STUDY, "scenes": ["set/oen"]}
-    study.write_text(yaml.safe_dump(STUDY_TYPO), encoding="utf-8")
+    study.write_text(yaml.safe_dump({**STUDY, "scenes": ["set/oen"]}), encoding="utf-8")
     status, out, err = run(capsys, "study", study)
     assert (status, err.count("\n")) == (2, 1)
-    assert "unknown scene 'set.oen'" in err
+    assert "unknown scene 'set/oen'; did you mean 'set/one'?" in err
+    study.write_text(yaml.safe_dump({**STUDY, "scenes": ["set/one/two"]}), encoding="utf-8")
+    assert run(capsys, "study", study)[0] == 2
 
 
 @pytest.mark.parametrize("name", ["mine", "paper"])
