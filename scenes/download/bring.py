@@ -64,10 +64,11 @@ def bring(scene: Listed, data: DataSet, place: Place, force: bool = False) -> Pa
             return folder
         staging = folder.with_name(f".part-{folder.name}")
         state = State(place.root / ".viewbench" / "state" / f"{scene.name.replace('/', '+')}.json", staging)
-        if state.begin(force) and scene.archive is not None:
+        anew = state.begin(force)
+        if anew and scene.archive is not None:
             place.kept_archive(scene.archive).unlink(missing_ok=True)
         if scene.archive is None:
-            made_from = drive.bring(scene, data, staging, folder, place)
+            made_from = drive.bring(scene, data, staging, folder, place, anew)
         elif kind_of(scene.archive.address) == "zip":
             made_from = _zip(scene, scene.archive, staging, state, place)
         else:

@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from .bring import Place
 
 
-def bring(scene: Listed, data: DataSet, staging: Path, folder: Path, place: "Place") -> dict[str, Any]:
+def bring(scene: Listed, data: DataSet, staging: Path, folder: Path, place: "Place", anew: bool) -> dict[str, Any]:
     """Fills `staging` with the scene's files, or with those of the archive that is called like it.
+
+    With `anew` an archive that is kept from before is fetched again.
 
     Raises UserError for a folder without either, and where Google refuses, with what to do by hand.
     """
@@ -34,6 +36,8 @@ def bring(scene: Listed, data: DataSet, staging: Path, folder: Path, place: "Pla
         raise UserError(
             f"the shared folder has neither '{scene.prefix}' nor an archive of it, but {shown or 'nothing'}; {by_hand}"
         )
+    if anew:
+        place.kept(files[archive], PurePosixPath(archive).name).unlink(missing_ok=True)
     return _unpacked(scene, archive, files[archive], staging, place, by_hand)
 
 

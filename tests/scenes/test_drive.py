@@ -118,7 +118,7 @@ def drive(request, server, tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     said: list[str] = []
 
-    def fetch(files, scene="kitchen_1"):
+    def fetch(files, scene="kitchen_1", force=False):
         if request.param == "stand-in":
             fake = StandIn(files)
             fake.__spec__ = importlib.machinery.ModuleSpec("gdown", None)
@@ -128,7 +128,7 @@ def drive(request, server, tmp_path, monkeypatch):
             publish(server, files)
             redirect(monkeypatch, server)
         place = Place(tmp_path / "data", said.append, patience=Patience(5, 2, 0))
-        return bring(catalogue.expand(f"set/{scene}")[0], catalogue.read()["set"], place)
+        return bring(catalogue.expand(f"set/{scene}")[0], catalogue.read()["set"], place, force)
 
     fetch.said, fetch.root = said, tmp_path / "data"
     return fetch
@@ -217,6 +217,11 @@ def test_an_archive_is_unpacked(drive, name, prefix):
     assert contents(drive({"note.txt": b"x", name: packed(SCENE, prefix)})) == SCENE
     kept = list((drive.root / ".viewbench" / "archives").iterdir())
     assert len(kept) == (name == "set.zip"), "an archive of several scenes is kept for the others"
+    changed = {**SCENE, "train/c.jpg": b"\xff\xd8new"}
+    with pytest.raises(UserError, match="was changed on the server or on the way"):
+        drive({"note.txt": b"x", name: packed(changed, prefix)}, force=True)
+    (drive.root / ".viewbench" / "hashes.json").unlink()
+    assert contents(drive({"note.txt": b"x", name: packed(changed, prefix)}, force=True)) == changed
 
 
 def test_a_file_that_google_refuses_is_said_with_what_to_do_by_hand(drive):
