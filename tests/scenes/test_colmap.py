@@ -8,6 +8,7 @@ from PIL import Image
 from tests.conftest import known
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
+from viewbench.scenes.images import load_images
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.subset import write_scene, write_subset
 
@@ -128,6 +129,29 @@ def test_smaller_images_have_smaller_cameras(model):
     scene = opened(model)
     cameras = scene.train.cameras
     assert (cameras.width[0], cameras.height[0], cameras.fx[0], cameras.cx[0]) == (6, 4, 5, 3)
+
+
+def test_images_that_were_drawn_smaller_in_place_have_smaller_cameras_and_say_so(model):
+    """As the 3DGS authors' Tanks and Temples has it: images of half the size, the model's cameras of the full."""
+    whole = opened(model)
+    assert not any("scaled" in note for note in whole.notes)
+    for path in (model / "images").rglob("*.png"):
+        Image.open(path).resize((6, 4)).save(path)
+    scene = opened(model)
+    cameras = scene.train.cameras
+    assert (cameras.width[0], cameras.height[0], cameras.fx[0], cameras.cx[0]) == (6, 4, 5, 3)
+    assert "images are 6 wide and their cameras 12: cameras are scaled to them" in scene.notes
+    assert load_images(scene.train, np.array([0]), None)[0].shape == (1, 4, 6, 3)
+    # A picture of another shape, or larger, is not the camera's: that stays an error of whoever reads the pixels.
+    for size in ((6, 6), (24, 16)):
+        for path in (model / "images").rglob("*.png"):
+            Image.open(path).resize(size).save(path)
+        scene = opened(model)
+        assert scene.train.cameras.width[0] == 12
+        with pytest.raises(UserError, match="its camera says"):
+            load_images(scene.train, np.array([0]), None)
+    (model / "images" / "frame2.png").write_bytes(b"no image")
+    assert opened(model).train.cameras.width[0] == 12
 
 
 def test_both_ways_between_the_formats(model, small_room, tmp_path):

@@ -1,15 +1,26 @@
-"""List scenes, formats, selectors, encoders, backends, reports or studies."""
+"""List scenes, data sets, formats, selectors, encoders, backends, reports or studies."""
+
+from typing import TYPE_CHECKING
 
 import click
 
-KINDS = ("scenes", "formats", "selectors", "encoders", "backends", "reports", "studies")
+if TYPE_CHECKING:
+    from ...common.settings import SceneEntry, Settings
+
+KINDS = ("scenes", "datasets", "formats", "selectors", "encoders", "backends", "reports", "studies")
 
 
 @click.command()
 @click.argument("kind", type=click.Choice(KINDS))
 def command(kind: str) -> None:
     """Print what there is of KIND, one line each, and why something is unavailable."""
-    special = {"scenes": _scenes, "backends": _backends, "reports": _reports, "studies": _studies}
+    special = {
+        "scenes": _scenes,
+        "datasets": _datasets,
+        "backends": _backends,
+        "reports": _reports,
+        "studies": _studies,
+    }
     rows = special.get(kind, lambda: _plugins(kind))()
     width = max((len(name) for name, _ in rows), default=0)
     for name, text in rows:
@@ -36,19 +47,41 @@ def _reports() -> list[tuple[str, str]]:
 
 
 def _scenes() -> list[tuple[str, str]]:
+    from ...common import catalogue
     from ...common import settings as settings_file
     from ...common.errors import UserError
     from ...scenes.load import open_scene
 
     settings = settings_file.load()
     rows = []
-    for name, entry in settings.scenes.items():
+    entries = {**{name: entry for name in catalogue.names() if (entry := _here(name, settings))}, **settings.scenes}
+    for name, entry in entries.items():
         try:
             scene = open_scene(name, settings)
             text = f"{len(scene.train)} training and {len(scene.test)} test views, {scene.format} ({entry.path})"
         except UserError as error:
             text = f"[unavailable: {error}]"
         rows.append((name, text))
+    return rows
+
+
+def _here(name: str, settings: "Settings") -> "SceneEntry | None":
+    """What is known of a scene of the catalogue, where it is there and environment.toml has no name for it."""
+    entry = settings.entry(name)
+    folder = settings.folder_of(entry) if entry else None
+    named = any(other.path == entry.path for other in settings.scenes.values()) if entry else True
+    return entry if folder is not None and folder.exists() and not named else None
+
+
+def _datasets() -> list[tuple[str, str]]:
+    from ...common import catalogue
+
+    rows = []
+    for data in catalogue.read().values():
+        scenes = (
+            f"{len(data.scenes)} scenes, {data.size}" if data.scenes else "[unavailable: given by its authors only]"
+        )
+        rows.append((data.name, f"{data.title}: {scenes}, licence: {data.licence.name} ({data.home})"))
     return rows
 
 

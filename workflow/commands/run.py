@@ -13,6 +13,7 @@ import click
 
 NEEDED = ("snakemake", "jsonschema", "yaml", "numba", "skimage", "matplotlib", "jinja2", "mlflow")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+CATALOGUE = "VIEWBENCH_CATALOGUE"  # common/catalogue.py
 # Settings that name what is read; what is written (results/...) belongs to the folder of the study.
 READ = {
     "VIEWBENCH_DATA": ("data", "root"),
@@ -42,11 +43,16 @@ def command(context: click.Context, study: str, out: Path, jobs: int | None, opt
     """
     from ...common import extras
     from ...common import settings as settings_file
+    from ...common.errors import UserError
+    from ...scenes.whereabouts import absence
     from .. import _study
 
     extras.need(*NEEDED, use="running a study needs", extra="study")
     settings = settings_file.load()
-    name = _study.load(study, settings).name
+    loaded = _study.load(study, settings)
+    name, absent = loaded.name, absence(loaded.scenes, settings)
+    if absent:
+        raise UserError(absent)
     out.mkdir(parents=True, exist_ok=True)
     status = _wait(subprocess.Popen(arguments(study, out, jobs, options), env=environment(settings)))
     page = out / "results" / name / "reports" / "index.html"
@@ -83,6 +89,8 @@ def environment(settings: Any) -> dict[str, str]:
     scripts = [str(Path(sys.executable).parent), sysconfig.get_path("scripts", user)]
     found["PATH"] = os.pathsep.join([*scripts, found.get("PATH", os.defpath)])
     found["VIEWBENCH_ENVIRONMENT"] = str(settings.source.absolute())
+    if CATALOGUE in found:
+        found[CATALOGUE] = str(Path(found[CATALOGUE]).absolute())
     for variable, (section, key) in READ.items():
         value = getattr(getattr(settings, section), key)
         path = Path(value).expanduser()

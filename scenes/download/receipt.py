@@ -1,0 +1,54 @@
+"""Whether a scene is there and complete, by the receipt that its download leaves, and how it gets there whole."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+from ...common import plugins
+from ...common.catalogue import DataSet, Listed
+from ...common.errors import UserError
+from ...common.files import read_json, write_json
+
+RECEIPT = "download.json"  # in the scene's folder: what it was made from, and what belongs to it
+
+
+def is_there(scene: Listed, data: DataSet, root: Path) -> bool:
+    """Whether the scene is there and complete.
+
+    Raises UserError where a folder is there that is neither what was downloaded nor a capture that was put there by
+    hand.
+    """
+    folder = root / scene.path
+    if not folder.exists():
+        return False
+    if (folder / RECEIPT).is_file():
+        files = read_json(folder / RECEIPT, "receipt").get("files", {})
+        wrong = [name for name, size in files.items() if _size(folder / name) != size]
+        if wrong:
+            raise UserError(
+                f"'{folder}' is there, but {len(wrong)} of its {len(files)} files are missing or changed, such as "
+                f"'{wrong[0]}'; --force fetches it again"
+            )
+    elif not plugins.load("scenes.formats", data.format).detect(folder):
+        raise UserError(f"'{folder}' is there, and is no {data.format} capture; remove it, or --force replaces it")
+    return True
+
+
+def publish(scene: Listed, data: DataSet, staging: Path, folder: Path, made_from: dict[str, Any]) -> None:
+    """Writes the receipt and renames the folder; an old one goes only then."""
+    address = scene.archive.address if scene.archive else f"https://drive.google.com/drive/folders/{data.drive}"
+    found = sorted(path for path in staging.rglob("*") if path.is_file())
+    files = {path.relative_to(staging).as_posix(): path.stat().st_size for path in found}
+    licence = {"name": data.licence.name, "address": data.licence.address}
+    record = {"schema": 1, "scene": scene.name, "address": address, **made_from, "licence": licence, "files": files}
+    write_json(staging / RECEIPT, record)
+    old = folder.with_name(f".old-{folder.name}")
+    shutil.rmtree(old, ignore_errors=True)
+    if folder.exists():
+        folder.replace(old)
+    staging.replace(folder)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _size(path: Path) -> int | None:
+    return path.stat().st_size if path.is_file() else None
