@@ -140,16 +140,16 @@ def test_images_that_were_drawn_smaller_in_place_have_smaller_cameras_and_say_so
     scene = opened(model)
     cameras = scene.train.cameras
     assert (cameras.width[0], cameras.height[0], cameras.fx[0], cameras.cx[0]) == (6, 4, 5, 3)
-    assert "images are 6 wide and their cameras 12: cameras are scaled to them" in scene.notes
+    assert "images are 6 x 4, the model's cameras 12 x 8: the cameras were scaled" in scene.notes
     assert load_images(scene.train, np.array([0]), None)[0].shape == (1, 4, 6, 3)
-    # A picture of another shape, or larger, is not the camera's: that stays an error of whoever reads the pixels.
-    for size in ((6, 6), (24, 16)):
+    # Or the model was made of smaller pictures than those that lie there now.
+    for size, width in (((24, 16), 24), ((6, 6), 12)):  # one of another shape is an error of whoever reads the pixels
         for path in (model / "images").rglob("*.png"):
             Image.open(path).resize(size).save(path)
         scene = opened(model)
-        assert scene.train.cameras.width[0] == 12
-        with pytest.raises(UserError, match="its camera says"):
-            load_images(scene.train, np.array([0]), None)
+        assert scene.train.cameras.width[0] == width
+    with pytest.raises(UserError, match="its camera says"):
+        load_images(scene.train, np.array([0]), None)
     (model / "images" / "frame2.png").write_bytes(b"no image")
     assert opened(model).train.cameras.width[0] == 12
 

@@ -92,7 +92,7 @@ def capture(small_room, tmp_path_factory):
     folder = tmp_path_factory.mktemp("capture") / "room"
     scene = open_scene(str(small_room), settings_file.Settings(Path()))
     scene = dataclasses.replace(scene, test=scene.test.subset([]))
-    write_scene(scene, np.arange(len(scene.train)), folder, "colmap", copy=True)
+    write_scene(scene, np.arange(len(scene.train)), folder, "colmap", links="copy")
     noise = random.Random(0)
     (folder / "images_2" / "деталь").mkdir(parents=True)
     (folder / "images_2" / "деталь" / "küche 1.jpg").write_bytes(noise.randbytes(5000))

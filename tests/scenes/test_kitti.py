@@ -69,8 +69,8 @@ def test_a_linked_sequence_has_its_poses(tmp_path):
 def test_the_subset_is_written_as_transforms(tmp_path):
     folder, _ = kitti(tmp_path / "in")
     scene = opened(folder)
-    assert write_subset(scene, {"indices": [7, 3]}, tmp_path / "out") == "transforms"
-    np.testing.assert_allclose(opened(tmp_path / "out").train.cameras.c2w, scene.train.cameras.c2w[[7, 3]], atol=1e-12)
+    assert write_subset(scene, {"indices": [7, 3]}, tmp_path / "out")[0] == "transforms"
+    np.testing.assert_allclose(opened(tmp_path / "out").train.cameras.c2w, scene.train.cameras.c2w[[3, 7]], atol=1e-12)
 
 
 @pytest.mark.parametrize(

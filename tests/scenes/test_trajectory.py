@@ -222,7 +222,7 @@ def test_the_subset_has_the_images_names(tmp_path):
     scene = opened(tmp_path / "in", intrinsics=LENS)
     write_subset(scene, {"indices": [5, 0]}, tmp_path / "out")
     table = json.loads((tmp_path / "out" / "transforms.json").read_text())
-    assert [frame["file_path"] for frame in table["frames"]] == [f"images/{scene.train.names[i]}" for i in (5, 0)]
+    assert [frame["file_path"] for frame in table["frames"]] == [f"images/{scene.train.names[i]}" for i in (0, 5)]
 
 
 def test_other_formats_keep_their_folders(tmp_path, small_room):

@@ -27,14 +27,16 @@ def reference(chosen, at, gap, allowed) -> int:
     return NONE
 
 
-@st.composite
-def captures(draw):
+def _capture(draw):
     n = draw(st.integers(2, 10))
     at = np.cumsum(draw(st.lists(st.integers(0, 4), min_size=n, max_size=n))) * 1.0
     allowed = np.array(draw(st.lists(st.sampled_from([True, True, True, False]), min_size=n, max_size=n)))
     assume(allowed.any())
     order = draw(st.permutations(np.flatnonzero(allowed).tolist()))
     return at, allowed, order, draw(st.integers(1, 12)) / draw(st.sampled_from([1, 2]))
+
+
+captures = st.composite(_capture)
 
 
 @given(captures(), st.integers(0, 5), st.integers(0, 2**32 - 1))

@@ -50,7 +50,7 @@ def served(small_room, tmp_path, monkeypatch):
     """A data set of two scenes on a server of ours; DATA is a folder that is not there yet."""
     server = Server()
     scene = open_scene(str(small_room), Settings(Path()))
-    write_scene(scene, np.arange(len(scene.train)), tmp_path / "written", "transforms", copy=True)
+    write_scene(scene, np.arange(len(scene.train)), tmp_path / "written", "transforms", links="copy")
     with zipfile.ZipFile(tmp_path / "all.zip", "w") as archive:
         for name in ("one", "two"):
             for path in sorted(path for path in (tmp_path / "written").rglob("*") if path.is_file()):

@@ -55,16 +55,19 @@ def _named(scene: Any, option: str, lists: Sequence[str]) -> list[int]:
     index = {name: i for i, name in enumerate(scene.train.names)}
     short: dict[str, list[int]] = {}  # by the file's name without its folder, which is how people know a frame
     for name, i in index.items():
-        short.setdefault(name.rsplit("/", 1)[-1], []).append(i)
-        short.setdefault(name.rsplit("/", 1)[-1].rsplit(".", 1)[0], []).append(i)
+        for known in {_short(name), _short(name).rsplit(".", 1)[0]}:
+            short.setdefault(known, []).append(i)
     found: dict[int, None] = {}
     for text in lists:
         for name in _lines(option, text):
             fitting = [index[name]] if name in index else short.get(name, [])
             if not fitting and any(letter in name for letter in "*?["):
                 fitting = [i for other, i in index.items() if fnmatch.fnmatchcase(other, name)]
+                fitting = fitting or [i for other, i in index.items() if fnmatch.fnmatchcase(_short(other), name)]
             if not fitting:
-                held = name in scene.test.names
+                held = any(
+                    name in (other, _short(other), _short(other).rsplit(".", 1)[0]) for other in scene.test.names
+                )
                 why = "is a test view, which is never chosen" if held else f"is no training view{nearest(name, index)}"
                 raise UserError(f"{option}: '{name}' {why}; `viewbench select --dry-run` prints names as they are")
             if len(set(fitting)) > 1 and name in short and name not in index:
@@ -72,6 +75,11 @@ def _named(scene: Any, option: str, lists: Sequence[str]) -> list[int]:
                 raise UserError(f"{option}: '{name}' may be {two}; give the name with its folder")
             found.update(dict.fromkeys(fitting))
     return list(found)
+
+
+def _short(name: str) -> str:
+    """The file's name without its folder."""
+    return name.rsplit("/", 1)[-1]
 
 
 def _lines(option: str, text: str) -> list[str]:
