@@ -28,7 +28,7 @@ def inliers_along(pictures: Iterable[np.ndarray], count: int, progress: Progress
     extras.need("cv2")
     import cv2  # pyright: ignore[reportMissingImports]: an extra
 
-    sift: Any = cv2.SIFT_create(nfeatures=FEATURES)
+    sift: Any = cv2.SIFT_create(nfeatures=FEATURES)  # pyright: ignore[reportAttributeAccessIssue]: not in its stubs
     found = np.zeros((2, count), dtype=np.int64)
     before: list[tuple[np.ndarray, np.ndarray]] = []
     for k, grey in enumerate(pictures):

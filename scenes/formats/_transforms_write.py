@@ -52,7 +52,9 @@ def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> list[str]
             write_json(out / names[key], {**head, **(own.get(key, {}) if key != "train" else {}), "frames": listed})
         return []
     every = [frame for listed in frames.values() for frame in listed]
-    notes = _without_gaps(every) if not own else []
+    notes: list[str] = []
+    if not own:
+        notes = [*_without_bent_depths(every, splits), *_without_gaps(every)]
     notes += _place_smaller(every, scene.root, out, copy) if own else []
     if not own and scene.depth_unit and "depth_file_path" in every[0]:
         head["integer_depth_scale"] = scene.depth_unit  # instant-ngp's; nerfstudio is told on its command line
@@ -103,6 +105,18 @@ def _place_companions(frame: dict[str, Any], root: Path, out: Path, copy: bool) 
             frame[key] = str((root / name).resolve())
         elif not (out / name).exists():
             place_image(root / name, out / name, copy)
+
+
+def _without_bent_depths(frames: list[dict[str, Any]], splits: Mapping[str, Split]) -> list[str]:
+    """Takes depth images out where the lens has distortion, which nerfstudio takes out of the pictures alone."""
+    bent = any(split.cameras.distortion is not None for split in splits.values())
+    if not bent or not any("depth_file_path" in frame for frame in frames):
+        return []
+    for frame in frames:
+        frame.pop("depth_file_path", None)
+    return [
+        f"depth images are written and not named in {SINGLE}: their lens has distortion, and readers leave it in them"
+    ]
 
 
 def _without_gaps(frames: list[dict[str, Any]]) -> list[str]:

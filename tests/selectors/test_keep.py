@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.conftest import known
 from tests.selectors.test_every_selector import NAMES, SCENE, VIEWS, N, run
 from viewbench.common.errors import UserError
 from viewbench.selectors import _run
@@ -40,7 +41,7 @@ def test_excluded_views_are_as_if_they_were_not_there(selector):
     mask = np.zeros(N, dtype=bool)
     mask[left] = True
     smaller = dataclasses.replace(SCENE, train=SCENE.train.subset(left))
-    alone = run(selector, 6, scene=smaller, features=VIEWS.features[left])
+    alone = run(selector, 6, scene=smaller, features=known(VIEWS.features)[left])
     assert run(selector, 6, candidates=mask)["names"] == alone["names"]
 
 
@@ -62,7 +63,7 @@ def test_what_cannot_be_kept_is_said():
         _run.run(SCENE, "full", 28, 0, candidates=np.arange(N) > 0)
 
 
-def with_times(times) -> object:
+def with_times(times):
     return dataclasses.replace(VIEWS, times=None if times is None else np.asarray(times, dtype=float))
 
 

@@ -1,5 +1,6 @@
 """Jobs that are forked from a prepared process behave as `viewbench` itself does, and never outlive who asked."""
 
+import functools
 import os
 import signal
 import subprocess
@@ -71,7 +72,9 @@ def begin(package, tmp_path) -> Callable[..., subprocess.Popen]:
         command = [sys.executable, "-m", "viewbench", *arguments]
         environment = {**environment_of(package), _fork_client.ADDRESS: str(tmp_path / "jobs"), **variables}
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        return subprocess.Popen(command, cwd=tmp_path, env=environment, preexec_fn=before, **pipes)
+        # Tests that run in a shell's background have SIGINT ignored, which those that they start would inherit.
+        usual = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+        return subprocess.Popen(command, cwd=tmp_path, env=environment, preexec_fn=before or usual, **pipes)
 
     return popen
 
