@@ -28,14 +28,15 @@ def inliers_along(pictures: Iterable[np.ndarray], count: int, progress: Progress
     extras.need("cv2")
     import cv2  # pyright: ignore[reportMissingImports]: an extra
 
-    sift: Any = cv2.SIFT_create(nfeatures=FEATURES)  # pyright: ignore[reportAttributeAccessIssue]: not in its stubs
+    opencv: Any = cv2  # whose stubs lack half of it
+    sift = opencv.SIFT_create(nfeatures=FEATURES)
     found = np.zeros((2, count), dtype=np.int64)
     before: list[tuple[np.ndarray, np.ndarray]] = []
     for k, grey in enumerate(pictures):
         points, descriptors = sift.detectAndCompute(grey, None)
         now = (np.array([point.pt for point in points]), np.zeros((0, 128)) if descriptors is None else descriptors)
         for back, other in enumerate(reversed(before)):
-            found[back, k - back - 1] = _inliers(cv2, other, now)
+            found[back, k - back - 1] = _inliers(opencv, other, now)
         before = [*before[-1:], now]
         progress(k + 1, count, "")
     return found

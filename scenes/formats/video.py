@@ -18,7 +18,7 @@ from ..types import Scene, Split
 from ._video_cache import hold, trim
 from ._video_decode import frames
 from ._video_packets import Packets, read_packets
-from ._video_picture import hdr, picture, size
+from ._video_picture import Look, hdr, look_of, picture, size
 from .images import nominal_cameras, unposed
 
 WRITABLE = True
@@ -64,8 +64,11 @@ def read(
     times = packets.times
     numbers = np.flatnonzero(kept(len(times), times, thinning))
     facts = _facts(root, folder, packets)
+    a, b, c, d = facts["turn"]
+    look = Look(packets.aspect, (a, b, c, d))
     if extract:
-        lost |= _extract(root, folder, packets, [n for n in numbers.tolist() if n not in lost], cache_gb, progress)
+        lost |= _extract(root, folder, packets, look, [n for n in numbers.tolist() if n not in lost], progress)
+        trim(cache_gb)
     numbers = np.array([n for n in numbers.tolist() if n not in lost], dtype=np.int64)
     if len(numbers) < 2:
         raise UserError(
@@ -75,7 +78,8 @@ def read(
     paths = tuple(folder / f"{name}.jpg" for name in names)
     sizes = np.tile(np.array(facts["size"], dtype=np.int64), (len(names), 1))
     split = Split(names, paths, nominal_cameras(sizes), times[numbers])
-    scene = unposed(root, "video", split, files=(root,), extracted=True, assumed=str(thinning), packets=packets)
+    details = {"extracted": True, "assumed": str(thinning), "packets": packets, "look": look}
+    scene = unposed(root, "video", split, files=(root,), **details)
     notes = [packets.cut, f"{len(lost)} frames cannot be decoded and are left out" if lost else ""]
     if facts["hdr"]:
         notes.append(f"its high dynamic range ({facts['hdr']}) is mapped to sRGB, reference white to 240 of 255")
@@ -122,14 +126,15 @@ def _facts(root: Path, folder: Path, packets: Packets) -> dict[str, Any]:
     if not file.is_file():
         for number in range(min(len(packets.frames), TRIED)):
             for _, frame in frames(root, packets, [number]):
-                write_json(file, {"size": size(frame, packets.aspect), "hdr": hdr(frame)})
+                look = look_of(frame, packets.aspect)
+                write_json(file, {"size": size(frame, look), "hdr": hdr(frame), "turn": look.turn})
                 return read_json(file, "cached facts")
         raise UserError(f"video '{root}' has no frame that can be decoded")
     return read_json(file, "cached facts")
 
 
 def _extract(
-    root: Path, folder: Path, packets: Packets, numbers: list[int], cache_gb: int, progress: Progress | None
+    root: Path, folder: Path, packets: Packets, look: Look, numbers: list[int], progress: Progress | None
 ) -> set[int]:
     """Puts the small pictures that are not in the folder there; returns the frames that cannot be decoded."""
     from PIL import Image
@@ -141,13 +146,12 @@ def _extract(
     left = set(missing)
     for number, frame in frames(root, packets, missing):
         with whole(folder / f"{frame_name(number)}.jpg") as temporary:
-            Image.fromarray(picture(frame, SMALL, packets.aspect)).save(temporary, format="JPEG", quality=92)
+            Image.fromarray(picture(frame, look, SMALL)).save(temporary, format="JPEG", quality=92)
         left.discard(number)
         if progress:
             progress(len(missing) - len(left), len(missing), "")
     known = folder / "lost.json"
     write_json(known, sorted(left | set(read_json(known, "cached list") if known.is_file() else [])))
-    trim(cache_gb)
     return left
 
 
@@ -156,7 +160,7 @@ def pictures(scene: Scene, names: list[str], longest: int | None = None) -> Iter
     packets = scene.details["packets"]
     wanted = sorted(frame_number(name) for name in names)
     for number, frame in frames(scene.root, packets, wanted):
-        yield frame_name(number), picture(frame, longest, packets.aspect)
+        yield frame_name(number), picture(frame, scene.details["look"], longest)
 
 
 def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> None:

@@ -1,5 +1,6 @@
 """Videos as people have them: which frames are decoded, under which numbers, turned how, in which colours."""
 
+import gc
 import json
 from fractions import Fraction
 
@@ -136,6 +137,21 @@ def test_frames_that_nothing_needs_are_left_out_of_decoding(tmp_path):
     found = [number for number, _ in _video_decode._attempt(path, packets, [50], 0)]
     assert 50 in found
     assert len(found) < 45
+
+
+def test_what_is_in_memory_does_not_grow_with_the_frames(tmp_path):
+    """Nothing but one picture's frames waits for the garbage collector: of a 4K video each is 12 MB."""
+    path = encode(tmp_path / "walk.mp4", scenery(60), prepare=lambda s: s.set_display_rotation(90))
+    gc.collect()
+    gc.disable()
+    try:
+        before = sum(isinstance(thing, av.VideoFrame) for thing in gc.get_objects())
+        scene = read(path)
+        write_subset(scene, {"indices": list(range(60))}, tmp_path / "out")
+        after = sum(isinstance(thing, av.VideoFrame) for thing in gc.get_objects())
+    finally:
+        gc.enable()
+    assert after - before <= 3
 
 
 def test_a_varying_frame_rate_is_thinned_by_time(tmp_path):
