@@ -13,7 +13,11 @@ import pytest
 from PIL import Image
 
 from tests.nerfstudio_code import dataparser
+from tests.scenes.test_euroc import euroc
+from tests.scenes.test_kitti import kitti
 from tests.scenes.test_rgbd import replica, scannet, seven, tum
+from tests.scenes.test_scannetpp import dslr
+from tests.scenes.test_trajectory import capture
 from tests.scenes.test_transforms import frames, opened, write
 from tests.scenes.test_written import files, picture
 from viewbench.scenes.subset import write_scene, write_subset
@@ -174,3 +178,44 @@ def test_depths_with_a_gap_are_not_named(tmp_path, nerfstudio):
     _, notes = write_subset(gap, {"indices": [1, 3]}, tmp_path / "gap")
     assert any("depth images" in note for note in notes)
     assert outputs(nerfstudio, tmp_path / "gap", "train").metadata["depth_filenames"] is None
+
+
+OTHERS = {
+    "euroc": lambda root: euroc(root),
+    "kitti": lambda root: kitti(root),
+    "scannetpp": lambda root: dslr(root),
+    "trajectory": lambda root: capture(root),
+}
+
+
+@pytest.mark.parametrize("form", OTHERS)
+def test_robots_captures_open_in_nerfstudio(tmp_path, nerfstudio, form):
+    made = OTHERS[form](tmp_path / "in")
+    root = made[0] if form == "kitti" else tmp_path / "in"
+    scene = opened(root, **({"intrinsics": "50,51,31.5,23.5"} if form == "trajectory" else {}))
+    assert scene.format == form
+    write_subset(scene, {"indices": [4, 1, 3]}, tmp_path / "out")
+    found = outputs(nerfstudio, tmp_path / "out", "train", orientation_method="none", center_method="none")
+    order = np.argsort([str(tmp_path / "out" / "images" / scene.train.names[i]) for i in (1, 3, 4)])
+    wanted = scene.train.subset(np.array([1, 3, 4])[order])
+    assert all(path.is_file() for path in found.image_filenames)
+    np.testing.assert_allclose(found.cameras.fx[:, 0], wanted.cameras.fx, rtol=1e-6)
+    poses = np.array(found.cameras.camera_to_worlds) / [1, 1, 1, found.dataparser_scale]
+    np.testing.assert_allclose(poses, wanted.cameras.c2w[:, :3], rtol=1e-4, atol=1e-4)
+
+
+def test_blenders_form_opens_in_nerfstudio_and_3dgs(tmp_path):
+    for split, count in (("train", 4), ("test", 2), ("val", 2)):
+        listed = frames(*(f"./{split}/r_{number}" for number in range(count)))
+        for frame in listed:
+            picture(tmp_path / "in" / f"{frame['file_path']}.png")
+        table = {"camera_angle_x": 1.0, "frames": listed}
+        (tmp_path / "in" / f"transforms_{split}.json").write_text(json.dumps(table))
+    write_subset(opened(tmp_path / "in"), {"indices": [3, 1]}, tmp_path / "out")
+    assert [path.name for path, *_ in read_by_3dgs(tmp_path / "out", "transforms_train.json")] == ["r_1.png", "r_3.png"]
+    with dataparser("blender_dataparser") as module:
+        for split, count in (("train", 2), ("val", 2), ("test", 2)):
+            parser = module.BlenderDataParserConfig(data=tmp_path / "out").setup()
+            names = parser.get_dataparser_outputs(split).image_filenames
+            assert len(names) == count
+            assert all(path.is_file() for path in names)
