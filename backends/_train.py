@@ -23,6 +23,7 @@ from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
 from ..scenes.images import read_images
+from ..scenes.lenses import pinholes
 from ..scenes.types import Cameras, Scene
 from ..selectors._selection import check_selection, selection_sha256
 from . import _registry
@@ -94,7 +95,7 @@ def train(
                 images=images,
                 points=scene.points,
                 chosen=indices,
-                training=scene.train.cameras if job.width is None else scene.train.cameras.scaled(job.width),
+                training=pinholes(scene.train.cameras if job.width is None else scene.train.cameras.scaled(job.width)),
             )
             trained = backend.train(data, work / "model", cell_seed, job.budget, options, report)
     except (UserError, MemoryError) as error:

@@ -39,8 +39,11 @@ def whole(path: str | os.PathLike) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def whole_folder(path: str | os.PathLike) -> Iterator[Path]:
-    """Yields a temporary folder beside `path` that takes its place on success; an old one goes only then."""
-    path = Path(path)
+    """Yields a temporary folder beside `path` that takes its place on success; an old one goes only then.
+
+    Where `path` is a link it is the folder that it leads to.
+    """
+    path = Path(os.path.realpath(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(prefix=".part-", dir=path.parent))
     try:

@@ -27,19 +27,28 @@ def beside(root: Path, names: Sequence[str]) -> list[tuple[Path, str]]:
     if not root.is_dir():
         return []
     folders = sorted(path for path in root.iterdir() if path.is_dir() and SIDE.fullmatch(path.name))
-    found = []
-    for folder in folders:
-        for name in names:
-            pure = PurePosixPath(name)
-            stems = [
-                name,
-                *(f"{name}{end}" for end in SUFFIXES),
-                *(pure.with_suffix(end).as_posix() for end in SUFFIXES),
-            ]
-            for place in dict.fromkeys(stems):
-                if is_file(folder / place):
-                    found.append((folder / place, f"{folder.name}/{place}"))
-    return found
+    return [
+        (folder / place, f"{folder.name}/{place}")
+        for folder in folders
+        for name in names
+        for place in _in(folder, name)
+    ]
+
+
+def first_of(root: Path, kind: str, names: Sequence[str]) -> tuple[Path | None, ...]:
+    """The file in the folder `kind` ("masks", "depths") of each image; empty where none has one."""
+    folder = root / kind
+    if not folder.is_dir():
+        return ()
+    found = tuple(next((folder / place for place in _in(folder, name)), None) for name in names)
+    return found if any(found) else ()
+
+
+def _in(folder: Path, name: str) -> list[str]:
+    """Names in the folder that belong to the image `name`."""
+    pure = PurePosixPath(name)
+    places = [name, *(f"{name}{end}" for end in SUFFIXES), *(pure.with_suffix(end).as_posix() for end in SUFFIXES)]
+    return [place for place in dict.fromkeys(places) if is_file(folder / place)]
 
 
 def smaller(root: Path, listed: Mapping[str, Sequence[str]]) -> tuple[list[tuple[Path, str]], list[str]]:

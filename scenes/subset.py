@@ -89,10 +89,20 @@ def check_target(scene: Scene, out: Path, format_name: str, force: bool) -> None
         )
     if lens not in ("", UNCALIBRATED) and format_name != scene.format:
         raise UserError(f"scene '{scene.name}' has {lens} cameras, which only its own format tells; undistort it first")
+    if out.exists() and _holds(out, scene):  # said before anybody is told of --force
+        raise UserError(f"'{out}' holds the capture itself, or files of it; name another folder")
     if out.exists() and (not out.is_dir() or any(out.iterdir())) and not force:
         raise UserError(f"'{out}' exists and is not empty; name another folder or give --force")
-    if out.resolve() == scene.root.resolve() or scene.root.resolve().is_relative_to(out.resolve()):
-        raise UserError(f"'{out}' holds the capture itself; name another folder")
+
+
+def _holds(out: Path, scene: Scene) -> bool:
+    """Whether files of the capture lie in the folder, wherever links lead: replacing it would lose them."""
+    folder = os.path.realpath(out)
+    files = [scene.root, *scene.files]
+    for split in (scene.train, scene.test):
+        files += [*split.paths, *filter(None, (*split.masks, *split.depths))]
+    found = {os.path.realpath(file) for file in files}
+    return any(file == folder or file.startswith(folder.rstrip(os.sep) + os.sep) for file in found)
 
 
 def _relate(folder: Path) -> None:
@@ -123,5 +133,8 @@ def place_image(source: Path, target: Path, copy: bool) -> None:
         raise UserError(f"image '{source}' and another frame's would both be written as '{target.name}'; rename one")
     if copy:
         shutil.copyfile(source, target)
-    else:
+        return
+    try:
         target.symlink_to(source.resolve())
+    except OSError as error:
+        raise UserError(f"'{target.name}' cannot be a link there ({error.strerror}); give --copy") from None

@@ -39,7 +39,16 @@ def candidates(split: Split, stride: int = 1, fps: float | None = None) -> np.nd
     thinning = Thinning(stride, fps)
     if thinning.fps is not None and split.times is None:
         raise UserError("the capture has no times, so --fps cannot be obeyed; thin it by --stride N")
-    return kept(len(split), split.times, thinning)
+    if thinning.fps is None or split.times is None:
+        return kept(len(split), split.times, thinning)
+    if (np.diff(split.times) < 0).any():
+        i = int((np.diff(split.times) < 0).argmax()) + 1
+        raise UserError(
+            f"the times of the capture fall at frame '{split.names[i]}' (several recordings?), so --fps cannot be "
+            "obeyed; thin it by --stride N"
+        )
+    # The cameras of a rig share their moments: all of a moment are candidates, or none.
+    return np.isin(split.times, split.times[kept(len(split), split.times, thinning)])
 
 
 def kept(n: int, times: np.ndarray | None, thinning: Thinning) -> np.ndarray:

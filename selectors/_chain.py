@@ -74,7 +74,7 @@ def fill(
         now = low
         for left, first in zip(range(len(earliest), 0, -1), earliest, strict=True):
             last = int(np.searchsorted(places, now + limit, side="right"))
-            window = np.arange(first, last)
+            window = np.arange(first, max(last, first + 1))  # both borders are rounded, each its own way
             if sharpness is None:
                 pick = window[np.abs(places[window] - (now + (high - now) / (left + 1))).argmin()]
             else:

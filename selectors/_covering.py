@@ -149,6 +149,6 @@ def _search(
             nearest.add(int(pick))
             done += 1
             left = float(nearest.distance.max())
-            if left <= within:
+            if left <= within and done >= len(views.kept):
                 return done, max(0.0, left)
         asked = min(n, max(asked + 1, int(GROWTH * asked)))

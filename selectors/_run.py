@@ -73,7 +73,7 @@ def run(
     if within is None:
         choice = plugin.select(views, count, generator("select", scene.name, selector, seed), **options)
     else:
-        from . import _covering  # no source: the order is the selector's, this says how much of it is enough
+        from . import _covering
 
         again = functools.partial(generator, "select", scene.name, selector, seed)
         choice, reached = _covering.enough(plugin, views, within, again, options)
@@ -172,6 +172,8 @@ def _without_poses(scene: Scene, selector: str, options: dict[str, Any], feature
     Raises UserError for a selector that needs poses, and for one that compares content when there are no features.
     """
     if selector in PLAIN:
+        if options.get("by") == "path":
+            raise UserError(f"'{scene.name}' has no poses and so no way walked; use by=time or by=index")
         return options
     if "factors" not in options:
         raise UserError(f"'{selector}' needs poses, which '{scene.name}' does not have; use maxmin, logdet or uniform")

@@ -109,6 +109,11 @@ def _greedy(
     for k in range(count):
         pick = prefer.best(residuals.left) if k else prefer.any(rng, len(similar))
         if residuals.left[pick] <= precision:
+            if pick in prefer.kept:  # like one chosen, and wanted all the same
+                indices.append(pick)
+                gains.append(float(np.log(precision / (regularise or 1))))
+                prefer.take(pick)
+                continue
             break
         indices.append(pick)
         gains.append(float(np.log(residuals.left[pick] / (regularise or 1))))

@@ -50,7 +50,7 @@ def select(
     chosen = np.empty(count, dtype=np.int64)
     gains = np.empty(count)
     for k in range(count):
-        if k and within is not None and nearest.distance.max() <= within:
+        if k >= max(1, len(views.kept)) and within is not None and nearest.distance.max() <= within:
             chosen, gains = chosen[:k], gains[:k]
             break
         pick = prefer.best(nearest.distance) if k else first(start, similar, prefer, rng)

@@ -1,6 +1,8 @@
 """Whether a scene is there and complete, by the receipt that its download leaves, and how it gets there whole."""
 
+import itertools
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +37,11 @@ def is_there(scene: Listed, data: DataSet, root: Path) -> bool:
 
 
 def publish(scene: Listed, data: DataSet, staging: Path, folder: Path, made_from: dict[str, Any]) -> None:
-    """Writes the receipt and renames the folder; an old one goes only then."""
+    """Writes the receipt and renames the folder; an old one goes only then.
+
+    What somebody added to the old folder (a camera.txt, a model trained in it) moves into the new one; a folder that no
+    receipt tells of is kept whole beside it.
+    """
     address = scene.archive.address if scene.archive else f"https://drive.google.com/drive/folders/{data.drive}"
     found = sorted(path for path in staging.rglob("*") if path.is_file())
     files = {path.relative_to(staging).as_posix(): path.stat().st_size for path in found}
@@ -47,7 +53,24 @@ def publish(scene: Listed, data: DataSet, staging: Path, folder: Path, made_from
     if folder.exists():
         folder.replace(old)
     staging.replace(folder)
-    shutil.rmtree(old, ignore_errors=True)
+    if (old / RECEIPT).is_file():
+        _move_added(old, folder)
+        shutil.rmtree(old, ignore_errors=True)
+    elif old.exists():
+        names = (folder.with_name(f"{folder.name}.old{k}") for k in itertools.count(1))
+        kept = next(path for path in names if not path.exists())
+        old.replace(kept)
+        print(f"viewbench: what was in '{folder}' is in '{kept}'", file=sys.stderr)
+
+
+def _move_added(old: Path, folder: Path) -> None:
+    """Moves files that the receipt of the old folder does not list, and that the new one does not have."""
+    listed = {*read_json(old / RECEIPT, "receipt").get("files", {}), RECEIPT}
+    for path in [path for path in old.rglob("*") if path.is_symlink() or path.is_file()]:
+        name = path.relative_to(old).as_posix()
+        if name not in listed and not (folder / name).exists():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            path.replace(folder / name)
 
 
 def _size(path: Path) -> int | None:

@@ -88,3 +88,18 @@ def check(model: Path) -> None:
             fits = False
         if not fits:
             raise UserError(f"COLMAP model '{model}' cannot be read: {path.name} is cut short or damaged")
+
+
+def pinholes(model: Path) -> bool:
+    """Whether all cameras of a binary model are PINHOLE or SIMPLE_PINHOLE, the only ones that the 3DGS authors' code
+    opens. True where there is no such file."""
+    if not (model / "cameras.bin").is_file():
+        return True
+    walker = _Walker((model / "cameras.bin").read_bytes())
+    for _ in range(walker.take("<Q")):
+        walker.skip(4)
+        kind = walker.take("<i")
+        if kind > 1:
+            return False
+        walker.skip(16 + 8 * PARAMETERS[kind])
+    return True

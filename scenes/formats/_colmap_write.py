@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import UserError
+from ...common.files import read_json, write_json
 from ..companions import beside
 from ..image_files import is_file, stored_name
 from ..splits import LEAST_TRACK
@@ -18,6 +19,7 @@ FOLDERS = ("images", "images_2", "images_4", "images_8")
 TEST = "test.txt"  # beside the model: names of the images that are held out, one a line
 TEST_MODEL = "test/sparse/0"  # the held-out images' own model, their pictures in test/images
 BOTH_MODEL = "colmap/sparse/0"  # nerfstudio's, with the images of both splits
+DEPTH_PARAMS = "depth_params.json"  # the 3DGS authors', beside the model
 EVALUATED = 8  # nerfstudio's curves are of every 8th image where there is no test split
 
 
@@ -41,17 +43,19 @@ def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> list[str]
     smaller = _smaller_folders(scene, [*names["train"], *names["test"]])
     _write_model(out, "sparse/0", scene, names, ("train",), train.cameras)
     _place(scene, names["train"], train.paths, smaller, out, copy)
-    if scene.format == "colmap":
-        for source, place in beside(scene.root, [*names["train"], *names["test"]]):
-            place_image(source, out / place, copy)
+    every = [*names["train"], *names["test"]]
+    for source, place in beside(scene.root, every) if scene.format == "colmap" else _of_frames(names, train, test):
+        place_image(source, out / place, copy)
+    notes = _notes(scene, train, smaller)
     if len(test):
         _place(scene, names["test"], test.paths, smaller, out, copy)
         _write_model(out / "test", "sparse/0", scene, names, ("test",), test.cameras)
         _place(scene, names["test"], test.paths, smaller, out / "test", copy)
         lines = [json.dumps(name) if "\n" in name else name for name in names["test"]]
         (out / "sparse" / "0" / TEST).write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
-    if any(name.splitlines() != [name] for name in (*names["train"], *names["test"])):
-        return []
+    _depth_params(scene, every, out)
+    if any(name.splitlines() != [name] for name in every):
+        return [*notes, "an image's name has a line break: nerfstudio, which cannot be told of it, gets no model"]
     splits, cameras = (
         (("train", "test"), (train.cameras, test.cameras)) if len(test) else (("train",), (train.cameras,))
     )
@@ -59,6 +63,39 @@ def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> list[str]
         held = names["test"] or names["train"][::EVALUATED]
         for split, listed in (("train", names["train"]), ("val", held), ("test", held)):
             (out / f"{split}_list.txt").write_text("".join(f"{name}\n" for name in listed), encoding="utf-8")
+    return notes
+
+
+def _of_frames(names: dict[str, list[str]], train: Split, test: Split) -> list[tuple[Path, str]]:
+    """Masks and depth images that another format has for its frames, and where nerfstudio's COLMAP reader looks."""
+    found = []
+    for key, split in (("train", train), ("test", test)):
+        for kind, files in (("masks", split.masks), ("depths", split.depths)):
+            for name, file in zip(names[key], files, strict=False):
+                if file is not None:
+                    found.append((file, f"{kind}/{PurePosixPath(name).with_suffix(file.suffix).as_posix()}"))
+    return found
+
+
+def _depth_params(scene: Scene, names: Sequence[str], out: Path) -> None:
+    """Writes the part of the 3DGS authors' depth_params.json (scales by image, for `-d`) that is of these images."""
+    if scene.format != "colmap" or not is_file(file := scene.details["models"]["train"] / DEPTH_PARAMS):
+        return
+    known, stems = read_json(file, "depth parameters"), {name.rsplit(".", 1)[0] for name in names}
+    write_json(out / "sparse" / "0" / DEPTH_PARAMS, {key: known[key] for key in known if key in stems})
+
+
+def _notes(scene: Scene, train: Split, smaller: Sequence[str]) -> list[str]:
+    """What of the capture is left out, or written as few readers have it."""
+    if scene.format == "colmap":
+        here = (*smaller, _images_folder(scene).name)
+        gone = [name for name in FOLDERS if name not in here and (scene.root / name).is_dir()]
+        return [f"{name}/ is left out: it does not have a picture of every image's name" for name in gone]
+    if train.cameras.distortion is not None and train.cameras.distortion[:, 4].any():
+        return [
+            "cameras with k3 are FULL_OPENCV in COLMAP, which nerfstudio and gsplat do not open: run colmap "
+            "image_undistorter first"
+        ]
     return []
 
 
@@ -118,6 +155,8 @@ def _write_model(
         model = new_model(cameras, wanted, scene.points)
     (out / place).mkdir(parents=True)
     model.write(out / place)
+    if not all(name.isascii() for name in wanted):
+        model.write_text(out / place)  # which the 3DGS authors' reader falls back to: of binary names it reads ASCII
     return True
 
 

@@ -1,6 +1,7 @@
-"""Writes transforms.json for nerfstudio and instant-ngp, and transforms_train/test.json in Blender's form."""
+"""Writes transforms.json for nerfstudio, and transforms_train/test.json in Blender's form."""
 
 import math
+import shutil
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -17,7 +18,8 @@ SINGLE, TRAIN, TESTS = "transforms.json", "transforms_train.json", ("transforms_
 COMPANIONS = {"mask_path": "masks", "depth_file_path": "depths"}  # nerfstudio's other files of a frame
 LENS = ("k1", "k2", "p1", "p2", "k3")  # in OpenCV's order
 BLENDER = "blender"  # folder of the images as readers of Blender's form name them
-OFF_CENTRE = 0.05  # of the picture: a principal point nearer to the middle is taken to be there
+OFF_CENTRE = 0.01  # of the picture: a principal point nearer to the middle is taken to be there
+SQUARE = 0.005  # two focal lengths that differ by less are one
 EVALUATED = 10  # nerfstudio's curves are of every 10th image where there is no test split
 
 
@@ -52,12 +54,8 @@ def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> list[str]
             write_json(out / names[key], {**head, **(own.get(key, {}) if key != "train" else {}), "frames": listed})
         return []
     every = [frame for listed in frames.values() for frame in listed]
-    notes: list[str] = []
-    if not own:
-        notes = [*_without_bent_depths(every, splits), *_without_gaps(every)]
+    notes = [*([] if own else _without_bent_depths(every, splits)), *_without_gaps(every)]
     notes += _place_smaller(every, scene.root, out, copy) if own else []
-    if not own and scene.depth_unit and "depth_file_path" in every[0]:
-        head["integer_depth_scale"] = scene.depth_unit  # instant-ngp's; nerfstudio is told on its command line
     lists = {key: [frame["file_path"] for frame in listed] for key, listed in frames.items()}
     held = lists["test"] or lists["train"][::EVALUATED]
     lists = {"train_filenames": lists["train"], "val_filenames": lists.get("spare") or held, "test_filenames": held}
@@ -160,6 +158,8 @@ def _blender(
         why = "its lens has distortion (convert --to colmap, then colmap image_undistorter)"
     elif max(abs(head["cx"] / head["w"] - 0.5), abs(head["cy"] / head["h"] - 0.5)) > OFF_CENTRE:
         why = "its principal point is not in the middle"
+    elif abs(head["fl_y"] / head["fl_x"] - 1) > SQUARE:
+        why = "its focal lengths differ"
     else:
         why = ""
     if why:
@@ -172,12 +172,20 @@ def _blender(
             target = out / f"{place}.png"
             target.parent.mkdir(parents=True, exist_ok=True)
             if copy:
-                target.hardlink_to(out / stored)
+                _double(out / stored, target)
             else:
                 target.symlink_to(Path("..", "..", stored))
             listed.append({"file_path": place, "transform_matrix": frame["transform_matrix"]})
         write_json(out / file, {"camera_angle_x": head["camera_angle_x"], "frames": listed})
     return []
+
+
+def _double(file: Path, target: Path) -> None:
+    """The file under a second name: a hard link, or a copy where the file system has none."""
+    try:
+        target.hardlink_to(file)
+    except OSError:
+        shutil.copyfile(file, target)
 
 
 def _shared(groups: list[Cameras]) -> dict[str, Any]:

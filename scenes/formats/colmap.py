@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...common.errors import UserError
+from ..companions import first_of
 from ..image_files import image_size, is_file, leaves
 from ..splits import training_points
 from ..types import OPENCV, Cameras, Points, Scene, Split
@@ -82,14 +83,14 @@ def read(root: Path, model_number: int | None = None) -> Scene:
         raise UserError(f"'{root}' has no COLMAP model: no cameras, images and points3D in sparse/0")
     reconstruction, images = _registered(model)
     folder = next((root / name for name in FOLDERS if (root / name).is_dir()), root / "images")
-    every, points = _split(reconstruction, images, folder), _points(reconstruction, images)
+    every, points = _split(reconstruction, images, folder, root), _points(reconstruction, images)
     files, notes = [model], [*_others(root, model), *_resized(reconstruction, images, every, folder)]
     details: dict[str, Any] = {"images": folder}
     test = _test_model(root, model)
     if test is not None:
         test_images = test[1]
         kept = np.arange(len(images))
-        held_split = _split(*test, folder=root / TEST_MODEL.split("/")[0] / folder.name)
+        held_split = _split(*test, folder=root / TEST_MODEL.split("/")[0] / folder.name, beside=root)
         files.append(root / TEST_MODEL)
         details["models"] = {"train": model, "test": root / TEST_MODEL}
         both = root / BOTH_MODEL
@@ -165,8 +166,8 @@ def _registered(model: Path) -> tuple[Any, list[Any]]:
     return reconstruction, images
 
 
-def _split(reconstruction: Any, images: Sequence[Any], folder: Path) -> Split:
-    """Frames of these images, whose pictures are in `folder`."""
+def _split(reconstruction: Any, images: Sequence[Any], folder: Path, beside: Path) -> Split:
+    """Frames of these images, whose pictures are in `folder`, and masks and depth images in folders of `beside`."""
     world_to_camera = np.stack([image.cam_from_world().matrix() for image in images])
     turn = world_to_camera[:, :, :3].transpose(0, 2, 1)
     poses = np.tile(np.eye(4), (len(images), 1, 1))
@@ -185,7 +186,8 @@ def _split(reconstruction: Any, images: Sequence[Any], folder: Path) -> Split:
     names = tuple(image.name for image in images)
     paths = tuple(folder / name for name in names)
     lens = next((name for image in images if (name := _lens(reconstruction.cameras[image.camera_id]))), "")
-    return Split(names, paths, _fitted(cameras, paths), lens=lens)
+    depths, masks = (first_of(beside, kind, names) for kind in ("depths", "masks"))
+    return Split(names, paths, _fitted(cameras, paths), lens=lens, depths=depths, masks=masks)
 
 
 def _fitted(cameras: Cameras, paths: Sequence[Path]) -> Cameras:

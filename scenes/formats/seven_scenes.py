@@ -1,6 +1,7 @@
 """7-Scenes: seq-XX/frame-XXXXXX.color.png with .pose.txt, split by TrainSplit.txt and TestSplit.txt."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -71,7 +72,7 @@ def read(root: Path) -> Scene:
             *(_beside(path, POSE_SUFFIX) for path in every),
         ),
         notes=(*_assumed(own), *_depth_note(every), *notes),
-        details={} if all(own.values()) else {"assumed": repr((camera, transform.tolist()))},
+        details={} if all(own.values()) else {"assumed": repr((replace(camera, source=""), transform.tolist()))},
     )
 
 

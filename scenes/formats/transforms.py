@@ -10,7 +10,7 @@ from ...common.errors import UserError
 from ...common.files import read_json
 from ..image_files import image_size, is_file, leaves
 from ..types import Cameras, Points, Scene, Split
-from ._transforms_write import LENS, SINGLE, TESTS, TRAIN, write
+from ._transforms_write import COMPANIONS, LENS, SINGLE, TESTS, TRAIN, write
 
 __all__ = ["WRITABLE", "detect", "read", "write"]
 
@@ -122,7 +122,15 @@ def _split(root: Path, file: Path, table: Any, allow_outside: bool) -> Split:
         height=values[:, 5].astype(np.int64),
         distortion=values[:, 6:] if values[:, 6:].any() and not lens else None,
     )
-    return Split(tuple(names), tuple(paths), cameras, _times(times), lens)
+    beside = (_beside(root, table["frames"], key) for key in COMPANIONS)
+    masks, depths = (files if any(files) else () for files in beside)
+    return Split(tuple(names), tuple(paths), cameras, _times(times), lens, depths, masks)
+
+
+def _beside(root: Path, frames: list[dict], key: str) -> tuple[Path | None, ...]:
+    """The mask or depth image of each frame, where it is there."""
+    named = (frame.get(key) for frame in frames)
+    return tuple(root / name if isinstance(name, str) and is_file(root / name) else None for name in named)
 
 
 def _times(values: list[Any]) -> np.ndarray | None:

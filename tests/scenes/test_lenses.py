@@ -181,3 +181,19 @@ def test_so_is_one_in_transforms(tmp_path, head):
     assert opened(tmp_path / "out").train.lens
     with pytest.raises(UserError, match="undistort"):
         load_images(scene.train, np.array([0]), None)
+
+
+def test_two_lenses_in_turn_are_each_taken_out_by_their_own(tmp_path):
+    listed = frames("a.png", "b.png", "c.png")
+    for frame, k1 in zip(listed, (0.2, -0.1, 0.2), strict=True):
+        frame["k1"] = k1
+    folder = write(tmp_path, listed, size=(64, 48), fl_x=60.0)
+    noise = np.random.default_rng(0).integers(0, 255, (48, 64, 3), dtype=np.uint8)
+    for name in ("a.png", "b.png", "c.png"):
+        Image.fromarray(noise).save(folder / name)
+    split = opened(folder).train
+    together, _ = load_images(split, np.arange(3), None)
+    for i in range(3):
+        alone, _ = load_images(split, np.array([i]), None)
+        np.testing.assert_array_equal(together[i], alone[0])
+    assert np.abs(together[0] - together[1]).max() > 0.01

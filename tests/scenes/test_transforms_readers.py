@@ -133,7 +133,7 @@ def test_an_rgbd_set_opens_in_nerfstudio_and_in_3dgs(tmp_path, nerfstudio, make,
     make(root)
     scene = opened(root, holdout="every:4")
     for part in (scene.train.cameras, scene.test.cameras):  # the fixtures' cameras are anything; 3DGS wants them simple
-        part.cx[:], part.cy[:] = part.width / 2, part.height / 2
+        part.cx[:], part.cy[:], part.fy[:] = part.width / 2, part.height / 2, part.fx
     write_subset(scene, {"indices": [5, 2]}, tmp_path / "out", links=links)
     wanted = [Path(scene.train.names[i]).name for i in (2, 5)]
     assert names_of(nerfstudio, tmp_path / "out", "train") == wanted
@@ -173,7 +173,6 @@ def test_depths_with_a_gap_are_not_named(tmp_path, nerfstudio):
     write_subset(whole, {"indices": [1, 3]}, tmp_path / "out")
     found = outputs(nerfstudio, tmp_path / "out", "train")
     assert all(path.is_file() for path in found.metadata["depth_filenames"])
-    assert json.loads((tmp_path / "out" / "transforms.json").read_text())["integer_depth_scale"] == 0.001
     gap = replace(scene, train=replace(scene.train, depths=(*depths[:3], None, *depths[4:])))
     _, notes = write_subset(gap, {"indices": [1, 3]}, tmp_path / "gap")
     assert any("depth images" in note for note in notes)
@@ -219,3 +218,26 @@ def test_blenders_form_opens_in_nerfstudio_and_3dgs(tmp_path):
             names = parser.get_dataparser_outputs(split).image_filenames
             assert len(names) == count
             assert all(path.is_file() for path in names)
+
+
+@pytest.mark.parametrize(
+    ("intrinsics", "words"), [("60,75,31.5,23.5", "focal lengths differ"), ("60,60,34.5,23.5", "not in the middle")]
+)
+def test_cameras_that_blenders_form_cannot_say_have_no_such_files(tmp_path, intrinsics, words):
+    capture(tmp_path / "in")
+    scene = opened(tmp_path / "in", intrinsics=intrinsics)
+    _, notes = write_subset(scene, {"indices": [0, 1]}, tmp_path / "out")
+    assert words in notes[0]
+    assert not (tmp_path / "out" / "transforms_train.json").exists()
+
+
+def test_masks_with_a_gap_are_not_named(tmp_path, nerfstudio):
+    """Nerfstudio refuses such a file; of its own a capture keeps the masks, and nerfstudio opens the subset."""
+    listed = frames(*NAMES[:4])
+    listed[0]["mask_path"] = "masks/a.png"
+    picture(tmp_path / "in" / "masks" / "a.png")
+    head = {"w": 8, "h": 6, "fl_x": 5.0, "fl_y": 5.0, "cx": 4, "cy": 3}
+    scene = opened(write(tmp_path / "in", listed, **head))
+    _, notes = write_subset(scene, {"indices": [0, 1]}, tmp_path / "out")
+    assert "masks are written and not named" in notes[0]
+    assert outputs(nerfstudio, tmp_path / "out", "train").mask_filenames is None

@@ -2,6 +2,7 @@
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pycolmap
@@ -206,3 +207,87 @@ def test_names_that_are_not_utf8_have_a_hash(tmp_path):
         picture(folder / f"{number}.png")
     (folder / "0.png").rename(folder / "caf\udce9.png")
     assert len(scene_sha256(opened(folder))) == 64
+
+
+@pytest.mark.parametrize("place", ["images", ".", "images/.."])
+def test_a_folder_that_has_files_of_the_capture_is_never_replaced(tmp_path, place):
+    folder = colmap(tmp_path / "in", ["a.png", "b.png", "c.png"])
+    with pytest.raises(UserError, match="holds the capture itself"):
+        write_subset(opened(folder), {"indices": [1]}, folder / place, force=True)
+    assert len(files(folder / "images")) == 3
+
+
+def test_nor_is_one_that_its_links_lead_to(tmp_path):
+    folder = colmap(tmp_path / "in", ["a.png", "b.png", "c.png"])
+    (folder / "images").rename(tmp_path / "pictures")
+    (folder / "images").symlink_to(tmp_path / "pictures")
+    with pytest.raises(UserError, match="holds the capture itself"):
+        write_subset(opened(folder), {"indices": [1]}, tmp_path / "pictures", force=True)
+    write_subset(opened(folder), {"indices": [0, 1]}, tmp_path / "sub")
+    with pytest.raises(UserError, match="holds the capture itself"):
+        write_subset(opened(tmp_path / "sub"), {"indices": [1]}, tmp_path / "pictures", force=True)
+    assert len(files(tmp_path / "pictures")) == 3
+
+
+def test_a_link_to_a_folder_is_filled_where_it_leads(tmp_path):
+    folder = colmap(tmp_path / "in", ["a.png", "b.png", "c.png"])
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "disk")
+    for _ in range(2):
+        write_subset(opened(folder), {"indices": [1]}, tmp_path / "out", force=True)
+    assert (tmp_path / "out").is_symlink()
+    assert files(tmp_path / "disk" / "images") == ["b.png"]
+
+
+def test_where_no_link_can_be_made_the_sentence_says_copy(tmp_path, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(1, "Operation not permitted")
+
+    scene = opened(colmap(tmp_path / "in", ["a.png", "b.png"], params=[10, 10, 6, 4]))
+    monkeypatch.setattr(Path, "symlink_to", refuse)
+    monkeypatch.setattr(Path, "hardlink_to", refuse)
+    with pytest.raises(UserError, match="give --copy"):
+        write_subset(scene, {"indices": [1]}, tmp_path / "out")
+    write_scene(scene, np.array([0, 1]), tmp_path / "out", "transforms", links="copy")
+    assert len(files(tmp_path / "out" / "blender")) == 2
+
+
+def test_masks_and_depths_are_converted_both_ways(tmp_path):
+    listed = frames("images/a.jpg", "images/b.jpg", "images/c.jpg")
+    for frame in listed:
+        frame |= {"mask_path": "masks/all.png", "depth_file_path": f"d/{frame['file_path'][7]}.png"}
+        picture(tmp_path / "in" / frame["depth_file_path"])
+    picture(tmp_path / "in" / "masks" / "all.png")
+    scene = opened(write(tmp_path / "in", listed, fl_x=5), holdout="every:3")
+    write_scene(scene, np.arange(2), tmp_path / "colmap", "colmap")
+    for kind in ("masks", "depths"):
+        assert files(tmp_path / "colmap" / kind) == ["a.png", "b.png", "c.png"]
+    back = opened(tmp_path / "colmap")
+    assert [path and path.name for path in back.train.depths] == ["b.png", "c.png"]
+    write_scene(back, np.arange(2), tmp_path / "back", "transforms")
+    table = json.loads((tmp_path / "back" / "transforms.json").read_text())
+    for frame in table["frames"]:
+        assert (tmp_path / "back" / frame["mask_path"]).is_file()
+        assert (tmp_path / "back" / frame["depth_file_path"]).is_file()
+
+
+def test_names_that_are_no_ascii_have_a_text_model_too(tmp_path):
+    write_subset(opened(colmap(tmp_path / "in", ["żółć.png", "b.png"])), {"indices": [0, 1]}, tmp_path / "out")
+    assert "żółć.png" in (tmp_path / "out" / "sparse" / "0" / "images.txt").read_text(encoding="utf-8")
+    assert (tmp_path / "out" / "sparse" / "0" / "images.bin").is_file()
+
+
+def test_the_3dgs_authors_depth_scales_come_along(tmp_path):
+    folder = colmap(tmp_path / "in", ["a.png", "b.png"])
+    (folder / "sparse" / "0" / "depth_params.json").write_text(json.dumps({"a": {"scale": 1}, "b": {"scale": 2}}))
+    write_subset(opened(folder), {"indices": [1]}, tmp_path / "out")
+    assert json.loads((tmp_path / "out" / "sparse" / "0" / "depth_params.json").read_text()) == {"b": {"scale": 2}}
+
+
+def test_what_is_left_out_is_said(tmp_path):
+    folder = colmap(tmp_path / "in", ["a.png", "b.png"])
+    picture(folder / "images_2" / "a.png", (6, 4))
+    _, notes = write_subset(opened(folder), {"indices": [0, 1]}, tmp_path / "out")
+    assert "images_2/ is left out" in notes[0]
+    scene = opened(write(tmp_path / "bent", frames("a.png", "b.png"), fl_x=5, k1=0.1, k3=0.1))
+    assert "FULL_OPENCV" in write_scene(scene, np.arange(2), tmp_path / "colmap", "colmap")[0]

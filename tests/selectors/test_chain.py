@@ -159,3 +159,12 @@ def test_too_few_views_is_one_sentence_that_helps(capsys):
     gap = said[0].rsplit(" ", 1)[1]
     assert _main.run([*base, "--count", count, "--max-gap", "12f"]) == 0
     assert _main.run([*base, "--count", "10", "--max-gap", f"{gap}f"]) == 0
+
+
+@pytest.mark.parametrize("rate", [30, 29.97, 24, 7])
+def test_grids_whose_sums_are_rounded_have_a_sentence(rate):
+    """Limits that fall on the borders of frames, which the bisection of the smallest gap finds."""
+    at = np.arange(200) / rate
+    for count in range(1, 200):
+        gap = _chain.smallest_gap(at, count)
+        assert len(_chain.fill([], at, gap)) <= count

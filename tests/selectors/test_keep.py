@@ -8,10 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.conftest import known
+from tests.selectors import slow
 from tests.selectors.test_every_selector import NAMES, SCENE, VIEWS, N, run
 from viewbench.common.errors import UserError
+from viewbench.scenes.thinning import candidates
 from viewbench.selectors import _run
 from viewbench.selectors import uniform as uniform_selector
+
+
+def names_of(n):
+    return tuple(f"view {i}" for i in range(n))
+
 
 CHOOSING = [name for name in NAMES if name != "full"]
 
@@ -115,6 +122,61 @@ def test_steps_by_the_way_leave_a_dwell_alone():
     turning.rotations[:, 0, 1], turning.rotations[:, 1, 0] = -np.sin(angle), np.sin(angle)
     chosen = uniform_selector.select(turning, 8, np.random.default_rng(0), by="path").indices
     assert (chosen >= 19).sum() >= 7
+
+
+@pytest.mark.parametrize("count", [6, 20, 60])
+def test_a_gap_counts_as_one_step_at_most(count):
+    """20 s at 30 frames a second with 5 s lost amid them, and two walks ten minutes apart: nothing piles up there."""
+    lost = np.concatenate([np.arange(300) / 30, 15 + np.arange(300) / 30])
+    apart = np.concatenate([np.arange(300) / 30, 600 + np.arange(300) / 30])
+    for times in (lost, apart):
+        views = dataclasses.replace(slow.random_views(np.random.default_rng(0), n=600), times=times)
+        for seed in range(5):
+            chosen = np.sort(uniform_selector.select(views, count, np.random.default_rng(seed)).indices)
+            assert np.diff(times[chosen]).min() > 0.5 * 20 / count
+            assert abs((chosen < 300).sum() - count / 2) <= 1
+
+
+def test_times_that_fall_are_no_order(tmp_path):
+    times = np.concatenate([np.arange(15.0), np.arange(15.0)])
+    assert choose(6, times) == choose(6, None)
+    with pytest.raises(UserError, match="times that fall, as at view 15"):
+        choose(6, times, by="time")
+    with pytest.raises(UserError, match="fall at frame 'frame 015'"):
+        candidates(dataclasses.replace(SCENE.train, times=times), fps=0.5)
+
+
+def test_both_eyes_of_a_moment_are_looked_at_and_lost_moments_seen():
+    moments = np.repeat(np.concatenate([np.arange(10.0), 20 + np.arange(5.0)]), 2)
+    assert uniform_selector.uneven(moments)
+    assert not uniform_selector.uneven(np.repeat(np.arange(15.0), 2))
+    mask = candidates(dataclasses.replace(SCENE.train, times=np.repeat(np.arange(15.0), 2)), fps=0.5)
+    assert mask[0::2].tolist() == mask[1::2].tolist()
+    assert mask.sum() == 16
+
+
+def test_a_kept_view_takes_the_place_of_the_nearest():
+    kept = np.array([10, 29])
+    assert uniform_selector._with_kept(np.array([0, 10, 20, 30]), kept).tolist() == [10, 29, 0, 20]
+    assert uniform_selector._with_kept(np.array([0, 10, 20, 30]), np.array([11, 12])).tolist() == [11, 12, 0, 30]
+
+
+def test_a_kept_view_like_another_changes_nothing_but_its_place():
+    """Two equal frames of a video: log det knows nothing more of the second, and goes on with the others."""
+    same = [0, *range(N)]
+    twice = dataclasses.replace(SCENE, train=dataclasses.replace(SCENE.train.subset(same), names=names_of(N + 1)))
+    features = known(VIEWS.features)[same]
+    record = run("logdet", 9, scene=twice, features=features, keep=[0, 1])
+    alone = run("logdet", 8, keep=[0])
+    assert record["indices"][:2] == [0, 1]
+    assert [i - 1 for i in record["indices"][2:]] == alone["indices"][1:]
+
+
+@pytest.mark.parametrize("selector", ["maxmin", "logdet", "facility"])
+def test_enough_includes_all_kept_views(selector):
+    keep = list(range(0, N, 2))
+    record = run(selector, None, within=0.95, keep=keep)
+    assert record["indices"] == keep
 
 
 def test_words_that_mean_nothing_are_named():

@@ -106,9 +106,21 @@ def test_every_form_that_is_written_has_a_next_command(tmp_path, small_room, hel
     (blender / "train").mkdir(parents=True)
     (blender / "train" / "r_0.png").write_bytes(b"")
     (blender / "transforms_train.json").write_text(json.dumps({"frames": listed}))
+    assert "viewbench convert" in _next.commands(blender, "transforms", held)[0], "no angle of view"
+    (blender / "transforms_train.json").write_text(json.dumps({"camera_angle_x": 1.0, "frames": listed}))
     assert _next.commands(blender, "transforms", held)[0].endswith("--eval") == held
     (blender / "transforms_val.json").write_text(json.dumps({"frames": listed}))
     assert _next.commands(blender, "transforms", held)[0].endswith("blender-data")
+
+
+def test_a_camera_that_3dgs_refuses_is_undistorted_first(capsys, tmp_path):
+    folder = colmap(tmp_path / "bent", SIX, model="OPENCV", params=[10, 11, 6, 4, 0.1, 0, 0, 0])
+    _, _, err = run(capsys, folder, "--count", 2, *PLACES, "--out", tmp_path / "out")
+    assert "next, 3DGS: colmap image_undistorter" in err
+    smaller = colmap(tmp_path / "small", SIX, (6, 4), "images_2")
+    _, _, err = run(capsys, smaller, "--count", 2, *PLACES, "--out", tmp_path / "out2")
+    assert [line.split(": ")[1] for line in err.splitlines() if "next, " in line] == ["next, 3DGS"]
+    assert "-i images_2" in err
 
 
 def test_points_of_the_chosen_views_alone(capsys, tmp_path, small_room):

@@ -181,7 +181,8 @@ def _say(record: dict[str, Any], given: dict[str, Any]) -> None:
     if given["auto"] is not None:
         reached = record["notes"]["auto"]["reached"]
         among = f"{record['count']:,} of {record.get('candidates', record['n_views']):,} views"
-        words = f"every view left out is within {given['auto']:g} of a chosen one (the farthest {reached:.4f})"
+        among += " looked at" if "candidates" in record else ""
+        words = f"every one left out is within {given['auto']:g} of a chosen one (the farthest {reached:.4f})"
         click.echo(f"viewbench: {among}: {words}", err=True)
 
 
