@@ -59,7 +59,9 @@ def _still(path: Path, title: str, curve: np.ndarray, n: int, levels: Sequence[L
         axes.set_xlim(0, len(curve) * 1.02)
         if curve[-1] > 0:
             axes.set_yscale("log")
-            axes.set_ylim(bottom=0.7 * curve[-1])
+            axes.set_ylim(
+                bottom=0.7 * max(curve[-1], min((1 - level.similarity for level in levels), default=curve[-1]))
+            )
             axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
             axes.yaxis.set_minor_formatter(NullFormatter())

@@ -76,10 +76,11 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
         from ..common import catalogue  # no source: names to offer
 
         known = list(settings.scenes)
+        hint = nearest(name, [*known, *catalogue.names()])
+        if not hint and (os.sep in name or Path(name).suffix):
+            raise UserError(f"there is no file or folder '{name}'")
         raise UserError(
-            f"no folder and no scene of {settings.source} is called '{name}'"
-            f"{nearest(name, [*known, *catalogue.names()])} "
-            f"(scenes: {', '.join(known)})"
+            f"no folder and no scene of {settings.source} is called '{name}'{hint} (scenes: {', '.join(known)})"
         )
     folder = settings.folder_of(entry)
     if folder is None or not folder.exists():

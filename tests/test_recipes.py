@@ -51,6 +51,7 @@ FORMAT = """
 \"\"\"Frames whose poses stand in one line each of frames.csv.\"\"\"
 import numpy as np
 from ._frames import split
+from ._intrinsics import Intrinsics
 from ..types import Scene
 def detect(root):
     return "it has frames.csv" if (root / "frames.csv").is_file() else None
@@ -58,7 +59,7 @@ def read(root):
     rows = [line.split(",") for line in (root / "frames.csv").read_text().splitlines()]
     paths = [root / row[0] for row in rows]
     poses = np.array([[float(number) for number in row[1:]] for row in rows]).reshape(-1, 4, 4)
-    train = split(root, paths, poses, (200.0, 200.0), (128.0, 128.0))
+    train = split(root, paths, poses, Intrinsics(200.0, 200.0, 128.0, 128.0, "of the room"))
     return Scene(root.name, root, "frames-csv", train, train.subset([]), files=(root / "frames.csv",))
 """
 ENCODER = """

@@ -37,8 +37,8 @@ def _images(root: Path) -> list[Path]:
 def read(root: Path) -> Scene:
     """All images as training views, in natural order of their names, without times.
 
-    Sizes are those of the photos as they are seen and written (`orientation`). Raises UserError when there are fewer
-    than two, when one is no image, for images of different sizes, and for HEIC photos without the package for them.
+    Sizes are those of the photos as they are seen and written (`orientation`); there may be several. Raises UserError
+    when there are fewer than two, when one is no image, and for HEIC photos without the package for them.
     """
     paths = _images(root)
     if len(paths) < 2:
@@ -50,13 +50,10 @@ def read(root: Path) -> Scene:
         if not (stored != stored[0]).any():
             sizes, turn = stored, False
             note = "photos held upright and across are written as the sensor saw them, of one size, and not turned"
-    odd = np.flatnonzero((sizes != sizes[0]).any(axis=1))
-    if len(odd):
-        first, other = paths[0], paths[odd[0]]
-        raise UserError(
-            f"images have different sizes: '{first.name}' is {sizes[0][0]} x {sizes[0][1]}, "
-            f"'{other.name}' {sizes[odd[0]][0]} x {sizes[odd[0]][1]}; resize them or keep one size"
-        )
+        else:
+            found, counts = np.unique(sizes, axis=0, return_counts=True)
+            listed = ", ".join(f"{count} of {w} x {h}" for (w, h), count in zip(found, counts, strict=True))
+            note = f"photos of several sizes ({listed}): each is a camera of its own to structure-from-motion"
     names = tuple(path.name for path in paths)
     scene = unposed(root, "images", Split(names, tuple(paths), nominal_cameras(sizes)), turn=turn)
     return replace(scene, notes=(*scene.notes, note)) if note else scene

@@ -47,7 +47,12 @@ def test_holding_out_moves_frames_and_nothing_else(small_room):
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("room_humna", "did you mean 'room_human'"), ("hololens_space", "set VIEWBENCH_DATA"), ("/nowhere", "no folder")],
+    [
+        ("room_humna", "did you mean 'room_human'"),
+        ("hololens_space", "set VIEWBENCH_DATA"),
+        ("/nowhere", "no file or folder"),
+        ("nowhere", "no folder"),
+    ],
 )
 def test_an_unknown_scene_is_one_sentence(name, words, monkeypatch):
     monkeypatch.delenv("VIEWBENCH_DATA", raising=False)

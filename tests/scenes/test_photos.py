@@ -108,11 +108,16 @@ def test_photos_held_both_ways_stay_as_the_sensor_saw_them(tmp_path):
         assert changed == (number in (1, 2))
 
 
-def test_two_sizes_are_still_refused(tmp_path):
+def test_several_sizes_are_several_cameras(tmp_path):
     folder = photos(tmp_path / "in", [1, 6])
     corners(80, 60).save(folder / "IMG 3.jpg")
-    with pytest.raises(UserError, match="different sizes"):
-        open_scene(str(folder), SETTINGS)
+    scene = open_scene(str(folder), SETTINGS)
+    assert "photos of several sizes" in scene.notes[-1]
+    write_subset(scene, {"indices": [0, 1, 2]}, tmp_path / "out")
+    sizes = zip(scene.train.cameras.width, scene.train.cameras.height, strict=True)
+    for path, size in zip(sorted((tmp_path / "out" / "images").iterdir()), sizes, strict=True):
+        with Image.open(path) as image:
+            assert image.size == size, "as they are seen"
 
 
 def test_a_cut_photo_with_a_tag_is_named_and_nothing_is_written(tmp_path):

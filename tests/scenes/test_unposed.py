@@ -70,10 +70,14 @@ def test_the_command_line_writes_the_chosen_images(folder, tmp_path, capsys):
     assert len(capsys.readouterr().out.splitlines()) == 4
 
 
-def test_images_of_two_sizes_are_refused(folder):
+def test_images_of_two_sizes_are_chosen_from(folder, tmp_path):
     Image.new("RGB", (10, 10)).save(folder / "shot 12.png")
-    with pytest.raises(UserError, match=r"shot 12\.png.*10 x 10"):
-        open_scene(str(folder), SETTINGS)
+    scene = open_scene(str(folder), SETTINGS)
+    assert "1 of 10 x 10" in scene.notes[-1]
+    rows = np.concatenate([features(), np.ones((1, features().shape[1]))])
+    record = _run.run(scene, "maxmin", len(scene.train), 0, features=rows)
+    write_subset(scene, record, tmp_path / "out")
+    assert len(list((tmp_path / "out" / "images").iterdir())) == len(scene.train)
 
 
 def test_a_file_that_is_no_image_is_named(folder):

@@ -38,7 +38,7 @@ VIEWS = slow.random_views(np.random.default_rng(11), n=N)
 SCENE = scene_of(VIEWS)
 
 
-def run(selector, count=10, seed=0, scene=SCENE, features=VIEWS.features, **others):
+def run(selector, count: int | None = 10, seed=0, scene=SCENE, features=VIEWS.features, **others):
     count = N if selector == "full" else count
     return _run.run(scene, selector, count, seed, features=features, **others)
 

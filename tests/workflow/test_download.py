@@ -1,5 +1,6 @@
 """`viewbench download` as a user meets it, and studies whose scenes are not there yet."""
 
+import functools
 import json
 import os
 import signal
@@ -170,7 +171,10 @@ def test_a_call_that_is_ended_is_gone_on_with_by_the_same_command(served, tmp_pa
     size = len(served.files["/all.zip"].data)
     served.files["/all.zip"].faults = [("", 0), ("", 0), ("stall", size // 4)]
     command = [sys.executable, "-m", "viewbench", "download", "set/one", "--accept-licence"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ)
+    # Tests that run in a shell's background have SIGINT ignored, which what they start would inherit.
+    usual = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen(command, env=os.environ, preexec_fn=usual, **pipes)
     assert served.stalled.wait(60)
     staging = tmp_path / "data sets" / "set" / ".part-one"
     deadline = time.monotonic() + 60

@@ -127,3 +127,41 @@ def test_points_of_the_chosen_views_alone(capsys, tmp_path, small_room):
     status, _, err = run(capsys, small_room, "--count", 3, *PLACES, "--points", "chosen", "--out", tmp_path / "out")
     assert (status, "which views see a point" in err) == (2, True)
     assert np.isfinite(len(opened(small_room).train))
+
+
+def test_what_may_not_be_chosen_is_not_opened(capsys, walk, tmp_path):
+    """A cut picture, a missing one and those between the candidates hold nobody up."""
+    (walk / "images" / SIX[1]).write_bytes(b"cut")
+    (walk / "images" / SIX[2]).unlink()
+    status, _, err = run(capsys, walk, "--count", 2, "--sharpness", 1, *PLACES, "--dry-run")
+    assert (status, "is missing" in err or "cannot be read" in err) == (2, True)
+    gone = ("--exclude", "frame01.png,frame02.png")
+    chosen = names(capsys, walk, "--count", 2, "--sharpness", 1, *PLACES, *gone, "--out", tmp_path / "out")
+    assert not set(chosen) & set(SIX[1:3])
+    assert names(capsys, walk, "--count", 2, *PLACES, "--stride", 3, "--dry-run")
+
+
+def test_a_gap_in_frames_is_said_to_be(capsys, walk):
+    _, _, err = run(capsys, walk, "--count", 3, *PLACES, "--max-gap", "3", "--dry-run")
+    assert "in frames, 3f" in err
+    _, _, err = run(capsys, walk, "--count", 3, *PLACES, "--max-gap", "3f", "--dry-run")
+    assert "no times" not in err
+
+
+def test_a_path_that_is_not_there_is_called_one(capsys, tmp_path):
+    for name in (tmp_path / "walk.mp4", "../nosuch", "nosuch.mov"):
+        status, _, err = run(capsys, name, "--count", 3, "--dry-run")
+        assert (status, err.strip()) == (2, f"viewbench: there is no file or folder '{name}'")
+    _, _, err = run(capsys, "room_humann", "--count", 3, "--dry-run")
+    assert "did you mean 'room_human'" in err
+
+
+def test_features_of_a_folder_without_results_are_kept_for_the_user(capsys, tmp_path, small_room, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    names(capsys, small_room, "--count", 2, "--sharpness", 1, *PLACES, "--dry-run")
+    assert not (tmp_path / "results").exists()
+    assert list((tmp_path / "cache" / "viewbench" / "features").rglob("*.npy"))
+    (tmp_path / "results").mkdir()
+    names(capsys, small_room, "--count", 2, "--sharpness", 1, *PLACES, "--dry-run")
+    assert list((tmp_path / "results" / "features").rglob("*.npy"))

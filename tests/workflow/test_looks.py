@@ -54,7 +54,7 @@ def test_redundancy_and_auto_say_the_same(capsys, tmp_path):
         assert level["nothing_new"] == 400 - level["enough"]
         auto = selection["notes"]["auto"]
         assert auto["distance"] == distance >= auto["reached"] > 0
-        assert f"{selection['count']} of 400 views: every view left out is within {distance:g} of a chosen one" in err
+        assert f"{selection['count']} of 400 views: every one left out is within {distance:g} of a chosen one" in err
 
 
 def test_the_table_is_the_curve_until_the_finest_similarity(capsys, tmp_path):

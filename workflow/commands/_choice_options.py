@@ -85,7 +85,7 @@ def features_of(scene: Any, selector: str, given: dict[str, Any], parameters: di
         return None
     from ...scenes.features import features
 
-    cache = Path(settings.features.cache)
+    cache = _cache(settings)
     progress = _options.progress("features")
     return features(scene.train, encoder, cache, settings.features.batch, progress, settings.compute.device)
 
@@ -94,7 +94,21 @@ def sharpness_of(scene: Any, settings: Any) -> Any:
     """How sharp each training image is, measured once and kept."""
     from ...scenes.sharpness import sharpness
 
-    return sharpness(scene.train, Path(settings.features.cache), _options.progress("sharpness"))
+    return sharpness(scene.train, _cache(settings), _options.progress("sharpness"))
+
+
+def _cache(settings: Any) -> Path:
+    """Folder of cached features: the setting's or, where that would begin a results/ in a folder that has none, the
+    user's."""
+    from ...common.files import user_cache
+
+    path = Path(settings.features.cache)
+    if path.is_absolute() or Path(path.parts[0]).is_dir():
+        return path
+    try:
+        return user_cache("features")
+    except RuntimeError:  # nobody's home
+        return path
 
 
 def check_file(option: str, path: Path | None, kinds: tuple[str, ...] = ()) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import click
 import numpy as np
 
 from ...scenes.thinning import frame_number
@@ -24,6 +25,8 @@ def without_gaps(
     """
     numbers = [frame_number(name) for name in scene.train.names] if scene.format == "video" else None
     gap, at, unit = gap_of(text, scene.train, None if numbers is None else np.array(numbers))
+    if unit == "frames" and "f" not in text:
+        click.echo(f"viewbench: the capture has no times, so --max-gap {text} is in frames, {gap:g}f", err=True)
     if 1 <= count <= len(at):  # else `choose` says so
         check_count(count, at, gap, allowed)
     whole = choose(count)

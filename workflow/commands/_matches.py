@@ -76,7 +76,9 @@ def _advice(scene: Scene, order: list[int], along: np.ndarray, gone: np.ndarray)
     shown = f"{max(1, round(gap))}" if unit == "f" else f"{np.ceil(gap * 100) / 100:g}"
     need = fewest(at, float(shown))
     more = int(np.ceil(1.2 * len(order)))
-    if need >= len(scene.train):
+    if max(need, more) > len(scene.train) and scene.details.get("assumed"):
+        return f" (the chain may break {where}: look at more frames than {scene.details['assumed']} gives)"
+    if max(need, more) > len(scene.train):
         return f" (the chain may break {where}: these frames overlap too little in the capture itself)"
     count = f" --count {max(more, need)}" if need > len(order) else f" or --count {more}"
     return f" (the chain may break {where}: --max-gap {shown}{unit}{count})"

@@ -1,6 +1,7 @@
 """Say how much of a capture repeats itself, and how many views are enough."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ RUNS = 5
 @click.option("--plot", type=click.Path(path_type=Path), help="Figure of the curve: .png, .pdf, .svg or .html.")
 @click.option("--out", type=click.Path(path_type=Path), help="The curve as a table (.csv).")
 @_options.scene_options
+@_options.thinning_options
 def command(**given: Any) -> None:
     """Say how much of SCENE repeats itself: how many views are enough for every frame to be so similar to one of them.
 
@@ -34,8 +36,11 @@ def command(**given: Any) -> None:
     uncovered distance: that (1 - similarity) of the frame left out that is farthest from the views chosen, which
     `viewbench select --auto` stops at. Without poses image content alone is compared.
     """
+    import numpy as np
+
     from ...common import settings as settings_file
     from ...common.errors import UserError
+    from ...scenes.thinning import candidates
     from ...scenes.validate import check_present
     from ...selectors import _covering, _redundancy, _run
 
@@ -51,6 +56,9 @@ def command(**given: Any) -> None:
         _choice_options.check_file("--plot", given["plot"])
     settings = settings_file.load()
     scene = given["scene"].open(settings)
+    if scene.format != "video" and (given["scene"].stride > 1 or given["scene"].fps is not None):
+        looked_at = candidates(scene.train, given["scene"].stride, given["scene"].fps)
+        scene = replace(scene, train=scene.train.subset(np.flatnonzero(looked_at)))
     parameters = _choice_options.parameters_of(given)
     _run.checked(scene, "maxmin", 1, parameters)
     check_present(scene)

@@ -1,5 +1,6 @@
 """Choose views of a capture and write them as a capture of the same format."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,8 @@ import click
 
 from ...common.errors import UserError
 from . import _choice_options, _lists, _next, _options
+
+FEW_POINTS = 1000  # fewer tell a trainer little of a room
 
 
 @click.command(cls=_choice_options.AutoCommand)
@@ -74,10 +77,12 @@ def command(**given: Any) -> None:
     keep, candidates = _lists.kept(scene, given), _candidates(scene, given)
     if writes:
         check_target(scene, given["out"], written_format(scene), given["force"])
-    check_present(scene)
+    looked_at = _looked_at(scene, candidates, keep)
+    check_present(looked_at)
     looks = _looks(scene, given, writes)
-    features = _choice_options.features_of(scene, given["selector"], given, parameters, settings)
-    sharp = _choice_options.sharpness_of(scene, settings) if parameters.get("sharpness") else None
+    features = _choice_options.features_of(looked_at, given["selector"], given, parameters, settings)
+    sharp = _choice_options.sharpness_of(looked_at, settings) if parameters.get("sharpness") else None
+    features, sharp = _of_all(features, n, candidates, keep), _of_all(sharp, n, candidates, keep)
 
     def choose(number: int | None) -> dict[str, Any]:
         return _run.run(
@@ -113,7 +118,9 @@ def command(**given: Any) -> None:
         _matches.check(scene, record, given["out"] if writes else None, given["selection"])
     if given["plot"] or given["sheet"]:
         if features is None and not scene.posed:
-            features = _choice_options.features_of(scene, "maxmin", given, {}, settings)
+            features = _of_all(
+                _choice_options.features_of(looked_at, "maxmin", given, {}, settings), n, candidates, keep
+            )
         _draw(given, scene, record, features)
     if writes:
         click.echo(f"viewbench: {record['count']} of {n} views are in {given['out']}; in the order chosen:", err=True)
@@ -163,6 +170,32 @@ def _candidates(scene: Any, given: dict[str, Any]) -> Any:
     return looked_at if allowed is None else looked_at & allowed
 
 
+def _looked_at(scene: Any, candidates: Any, keep: list[int]) -> Any:
+    """The scene with those training views alone that may be chosen: the others' images are not even opened."""
+    if candidates is None:
+        return scene
+    return replace(scene, train=scene.train.subset(_indices(candidates, keep)))
+
+
+def _of_all(values: Any, n: int, candidates: Any, keep: list[int]) -> Any:
+    """(N, …) values of all training views, of which those that were not looked at are ones that nobody reads."""
+    import numpy as np
+
+    if values is None or candidates is None or len(values) == n:
+        return values
+    every = np.ones((n, *values.shape[1:]), dtype=values.dtype)
+    every[_indices(candidates, keep)] = values
+    return every
+
+
+def _indices(candidates: Any, keep: list[int]) -> Any:
+    import numpy as np
+
+    allowed = candidates.copy()
+    allowed[keep] = True
+    return np.flatnonzero(allowed)
+
+
 def _looks(scene: Any, given: dict[str, Any], writes: bool) -> bool:
     """Whether neighbours are matched."""
     asked = given["check_matches"]
@@ -177,7 +210,8 @@ def _say(record: dict[str, Any], given: dict[str, Any]) -> None:
     """What a user must know of the choice."""
     for name, note in record.get("notes", {}).items():
         if name != "auto":
-            click.echo(f"viewbench: {name.replace('_', ' ')}: {note}", err=True)
+            shown = ", ".join(f"{key} {value:g}" for key, value in note.items()) if isinstance(note, dict) else note
+            click.echo(f"viewbench: {name.replace('_', ' ')}: {shown}", err=True)
     if given["auto"] is not None:
         reached = record["notes"]["auto"]["reached"]
         among = f"{record['count']:,} of {record.get('candidates', record['n_views']):,} views"
@@ -191,10 +225,15 @@ def _write(scene: Any, record: dict[str, Any], given: dict[str, Any]) -> None:
     from ...scenes import chosen_points  # no source: it writes what was chosen
     from ...scenes.subset import write_subset  # no source: likewise
 
+    before = 0 if scene.points is None else len(scene.points)
     if given["points"] == "chosen":
         scene = chosen_points.seen(scene, record["indices"])
     elif given["points"] == "triangulate":
         scene = chosen_points.triangulated(scene, record["indices"], _options.progress("triangulate"))
+    if given["points"] != "all":
+        after = 0 if scene.points is None else len(scene.points)
+        few = "; that is few to start training from" if after < FEW_POINTS else ""
+        click.echo(f"viewbench: {after:,} points ({given['points']}) in place of {before:,}{few}", err=True)
     links = "copy" if given["copy"] else "relative" if given["relative"] else "absolute"
     written, notes = write_subset(scene, record, given["out"], links, given["force"])
     if written != scene.format:
