@@ -48,9 +48,9 @@ def file_sha256(path: Path) -> str:
 
 def _hashes(paths: list[Path]) -> list[str]:
     """SHA-256 of each file."""
-    missing = [path for path in paths if not path.exists()]
-    if missing:  # said by whoever wants their pixels; a picture that nobody looks at may be gone
-        found = dict(zip(there := [path for path in paths if path not in {*missing}], _hashes(there), strict=True))
+    there = [path for path in paths if path.exists()]
+    if len(there) < len(paths):  # whoever wants a picture's pixels says that it is gone; a hash can do without
+        found = dict(zip(there, _hashes(there), strict=True))
         return [found.get(path, "missing") for path in paths]
     states = [_state(path) for path in paths]
     if sum(state[0] for state in states) < REMEMBERED_BYTES:

@@ -87,3 +87,14 @@ def test_a_home_that_cannot_be_written_to_costs_time_only(room, monkeypatch):
     monkeypatch.setattr(digest, "REMEMBERED_BYTES", 0)
     monkeypatch.setattr(digest, "SETTLED_S", -10)
     assert hashed(room) == hashed(room)
+
+
+def test_a_missing_picture_has_a_hash_of_its_own(room):
+    before = hashed(room)
+    victim = next((room / "train").glob("*.jpg"))
+    content = victim.read_bytes()
+    victim.unlink()
+    gone = hashed(room)
+    assert gone != before
+    victim.write_bytes(content)
+    assert hashed(room) == before
