@@ -99,5 +99,7 @@ def detect(root: Path) -> str:
             return name
     if root.is_file():
         raise UserError(f"'{root}' is a file and no video; name the folder that the capture is in")
+    if not any(root.iterdir()):
+        raise UserError(f"'{root}' is empty; name the folder that the capture is in")
     known = ", ".join(plugins.names(FORMATS))
     raise UserError(f"'{root}' is in no known format ({known}); see `viewbench list formats`, or force one by --format")

@@ -61,6 +61,9 @@ def test_an_unknown_scene_is_one_sentence(name, words, monkeypatch):
 
 
 def test_a_folder_without_a_format_says_so(tmp_path):
+    with pytest.raises(UserError, match="is empty"):
+        open_scene(str(tmp_path), SETTINGS)
+    (tmp_path / "notes.txt").write_text("none")
     with pytest.raises(UserError, match="no known format"):
         open_scene(str(tmp_path), SETTINGS)
 
