@@ -29,6 +29,7 @@ class SceneEntry:
     poses: str = ""  # trajectory of a folder of images; relative paths start at the scene's folder
     intrinsics: str = ""  # fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]
     times: str = ""  # times of the images, where their names have none
+    room: str = ""  # where it was captured: two walks through one room are one sample of rooms
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,11 @@ class Settings:
         """The group that tables put a scene in; `otherwise` where the file names none."""
         entry = self.entry(scene)
         return (entry.dataset if entry else "") or otherwise
+
+    def room_of(self, scene: str) -> str:
+        """The room that a scene was captured in: the scene itself where nothing names one."""
+        entry = self.entry(scene)
+        return (entry.room if entry else "") or scene
 
 
 def _of_catalogue(scene: str) -> SceneEntry | None:

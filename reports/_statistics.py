@@ -67,6 +67,19 @@ def difference(ours: Sequence[float], theirs: Sequence[float]) -> Difference:
     return Difference(mean, mean - half, mean + half)
 
 
+def over_samples(values: Sequence[float]) -> Difference:
+    """The mean of differences that are one sample each, with Student's interval (n − 1 degrees of freedom)."""
+    found = summary(values)
+    if found.std is None:
+        return Difference(found.mean, None, None)
+    if found.std == 0:
+        return Difference(found.mean, None, None, "no spread")
+    from scipy.special import stdtrit
+
+    half = float(stdtrit(found.n - 1, 0.5 + LEVEL / 2)) * found.std / math.sqrt(found.n)
+    return Difference(found.mean, found.mean - half, found.mean + half)
+
+
 def over_ratios(cells: Sequence[Cell], ratios: Sequence[float]) -> list[float]:
     """PSNR in dB of each seed, averaged over `ratios`; a seed that lacks one of them is left out.
 

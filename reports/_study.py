@@ -54,6 +54,7 @@ class SceneInfo:
     """Where a scene's cameras are, as `viewbench describe` wrote it."""
 
     name: str
+    room: str
     n_train: int
     n_test: int
     train_positions: list[list[float]]  # (n_train, 3) scene units
@@ -145,6 +146,7 @@ class Study:
         try:
             return SceneInfo(
                 name=name,
+                room=record.get("room") or name,
                 n_train=record["n_train"],
                 n_test=record["n_test"],
                 train_positions=record["train"]["positions"],

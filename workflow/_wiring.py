@@ -99,6 +99,10 @@ class Wiring:
         """The group that the scene's tables put it in."""
         return self.settings.dataset_of(wildcards.scene, "")
 
+    def room(self, wildcards: Any) -> str:
+        """The room that the scene was captured in."""
+        return self.settings.room_of(wildcards.scene)
+
     @cached_property
     def truth_width(self) -> int:
         """Width of the ground truth beside the renders in the reports: the study's widest."""

@@ -42,6 +42,7 @@ def command(scene: _options.Capture, out: Path, width: int | None) -> None:
         "schema": 1,
         "scene": opened.name,
         "dataset": settings.dataset_of(scene.name, opened.name),
+        "room": settings.room_of(scene.name),
         "format": opened.format,
         "holdout": opened.holdout,
         "n_train": len(opened.train),

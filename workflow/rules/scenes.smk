@@ -31,6 +31,7 @@ rule describe:
     params:
         width=WIRING.truth_width,
         dataset=WIRING.dataset,
+        room=WIRING.room,
     message:
         "describe {wildcards.scene}"
     shell:
