@@ -73,7 +73,7 @@ def run(
     if within is None:
         choice = plugin.select(views, count, generator("select", scene.name, selector, seed), **options)
     else:
-        from . import _covering
+        from . import _covering  # no source: for a command's --auto alone, which no study has
 
         again = functools.partial(generator, "select", scene.name, selector, seed)
         choice, reached = _covering.enough(plugin, views, within, again, options)
