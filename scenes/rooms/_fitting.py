@@ -99,9 +99,9 @@ def _moved_out(places: np.ndarray, room: Room, free: Space) -> tuple[np.ndarray,
     after ROUNDS goes there alone.
     """
     from scipy.ndimage import gaussian_filter1d
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    tree = cKDTree(free.points)
+    tree = KDTree(free.points)
     clear = places.copy()
     for turn in range(ROUNDS + 1):
         blocked = clearance(room, clear) < CLEARANCE_M

@@ -92,7 +92,7 @@ def bookcase(room: Builder, y0: float, y1: float, random: np.random.Generator) -
 def _book(room: Builder, y: float, z: float, random: np.random.Generator) -> float:
     wide, high = random.uniform(0.018, 0.05), random.uniform(0.17, 0.3)
     deep = random.uniform(0.15, 0.24)
-    uv = spine(random.integers(0, 4), random.integers(0, 32))
+    uv = spine(int(random.integers(0, 4)), int(random.integers(0, 32)))
     room.box(BOOK, (0.03, y, z), (0.05 + deep, y + wide, z + high), uv=uv)
     return wide + 0.002
 

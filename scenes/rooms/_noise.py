@@ -61,5 +61,5 @@ def byte_image(values: Array) -> Array:
 
 
 def whole(values: Any) -> tuple[int, ...]:
-    """The values as a tuple of integers, which is what Pillow takes for a colour."""
+    """The values as a tuple of integers, which is what Pillow takes for colours and places."""
     return tuple(int(value) for value in values)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...common.errors import UserError
 from ._exact import exp, length, smoothed
 from ._types import RGB, Walk
 
@@ -89,6 +90,17 @@ def at_rate(walk: Walk, rate: float) -> Walk:
     """Of a steered path, `rate` poses a second."""
     chosen = np.arange(0, len(walk), STEPS_PER_S / rate).astype(int)
     return Walk(chosen / STEPS_PER_S, walk.positions[chosen], walk.directions[chosen])
+
+
+def frames(walk: Walk, rate: float, count: int) -> Walk:
+    """`count` poses of a steered path, evenly spread: of `rate` a second or, where those are too few, of all.
+
+    Raises UserError where there are not so many.
+    """
+    slow = at_rate(walk, rate)
+    if count > len(walk):
+        raise UserError(f"the path has {len(walk)} poses, {STEPS_PER_S} a second; --frames {count} is more")
+    return (slow if count <= len(slow) else walk).picked(count)
 
 
 def constant_speed(stations: Sequence[tuple[RGB, RGB]], count: int, rate: float = 10.0) -> Walk:

@@ -86,7 +86,7 @@ def _discs(random: np.random.Generator) -> Array:
     for _ in range(70):
         x, y, r = random.integers(0, SIZE), random.integers(0, SIZE), random.integers(6, 32)
         fill = whole(random.integers(20, 240, 3))
-        draw.ellipse((x - r, y - r, x + r, y + r), fill=fill, outline=(10, 10, 10), width=2)
+        draw.ellipse(whole((x - r, y - r, x + r, y + r)), fill=fill, outline=(10, 10, 10), width=2)
     return np.asarray(canvas) / 255
 
 
@@ -122,12 +122,12 @@ def books() -> Array:
             ink = hsv(random.random(), random.uniform(0, 0.9), random.uniform(0.1, 1))
             for _ in range(random.integers(1, 4)):
                 band = top + random.integers(5, 240)
-                draw.rectangle((left, band, left + 31, band + random.integers(2, 14)), fill=ink)
+                draw.rectangle(whole((left, band, left + 31, band + random.integers(2, 14))), fill=ink)
             title = top + random.integers(40, 110)
             for k in range(random.integers(5, 12)):
                 line = title + k * 9
                 start, end = left + 9 + random.integers(0, 3), left + 21 + random.integers(-3, 4)
-                draw.rectangle((start, line, end, line + 5), fill=ink)
+                draw.rectangle(whole((start, line, end, line + 5)), fill=ink)
     return np.asarray(canvas)
 
 

@@ -18,9 +18,9 @@ NAMES = ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue")
 
 def seen(room: Room) -> tuple[np.ndarray, np.ndarray]:
     """(P, 3) float64 points and (P, 3) uint8 colours, at most COUNT, in a fixed random order."""
-    import bpy  # noqa: F401  # it brings mathutils
-    from mathutils import Vector
-    from mathutils.bvhtree import BVHTree
+    import bpy  # noqa: F401  # pyright: ignore[reportMissingImports]: an extra, which brings mathutils
+    from mathutils import Vector  # pyright: ignore[reportMissingImports]
+    from mathutils.bvhtree import BVHTree  # pyright: ignore[reportMissingImports]
 
     names, meshes = list(room.meshes), list(room.meshes.values())
     first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])

@@ -39,7 +39,7 @@ class Renderer:
     """
 
     def __init__(self, room: Room, size: int, threads: int = 1) -> None:
-        import bpy
+        import bpy  # pyright: ignore[reportMissingImports]: an extra
 
         self._bpy: Any = bpy
         self._folder = tempfile.TemporaryDirectory(prefix="viewbench-")
@@ -63,7 +63,7 @@ class Renderer:
 
         `samples` rays a pixel, then Open Image Denoise.
         """
-        import mathutils
+        import mathutils  # pyright: ignore[reportMissingImports]: comes with bpy
 
         scene = self._bpy.context.scene
         self._camera.matrix_world = mathutils.Matrix(c2w.tolist())

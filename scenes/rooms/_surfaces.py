@@ -52,7 +52,7 @@ def plaster() -> Array:
     draw = ImageDraw.Draw(canvas)
     for _ in range(500):
         x, y, r = random.integers(0, SIZE), random.integers(0, SIZE), random.integers(1, 5)
-        draw.ellipse((x - r, y - r, x + r, y + r), fill=whole(random.integers(40, 220, 3)))
+        draw.ellipse(whole((x - r, y - r, x + r, y + r)), fill=whole(random.integers(40, 220, 3)))
     return np.asarray(canvas)
 
 

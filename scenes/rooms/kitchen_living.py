@@ -8,8 +8,8 @@ from . import _kitchen, _living
 from ._builder import Builder
 from ._furniture import any_colour
 from ._materials import MATERIALS, textures
-from ._paths import Go, Stay, at_rate, constant_speed, steered
-from ._types import AreaLight, Room, Walk
+from ._paths import Go, Stay, at_rate, constant_speed, frames, steered
+from ._types import AreaLight, Room
 
 X, Y, Z = 6.0, 4.0, 2.6
 WINDOW = (1.0, 3.0, 0.9, 2.2)  # lowest and highest y, lowest and highest z, in the wall x = X
@@ -86,7 +86,8 @@ def build() -> Room:
     middle = (X - 0.015, (WINDOW[0] + WINDOW[1]) / 2, (WINDOW[2] + WINDOW[3]) / 2)
     turned = (math.pi / 2, 0.0, math.pi / 2)
     daylight = AreaLight("window", middle, turned, (wide, high), 8.0 * 2.6 * math.pi, (0.86, 0.94, 1.0))
-    human = at_rate(steered(HUMAN, HUMAN_START, seed=1), 10)
+    human = steered(HUMAN, HUMAN_START, seed=1)
+    test = steered(TEST, TEST_START, seed=2, jitter=0.8)
     return Room(
         meshes=meshes,
         materials=materials,
@@ -94,13 +95,13 @@ def build() -> Room:
         lights=(daylight,),
         parts=tuple(room.parts),
         inside=((0.0, 0.0, 0.0), (X, Y, Z)),
-        paths={"human": human.picked, "smooth": lambda count: constant_speed(SMOOTH, count), "test": _test},
-        points_path=human,
+        paths={
+            "human": lambda count: frames(human, 10, count),
+            "smooth": lambda count: constant_speed(SMOOTH, count),
+            "test": lambda count: frames(test, 1, count),
+        },
+        points_path=at_rate(human, 10),
     )
-
-
-def _test(count: int) -> Walk:
-    return at_rate(steered(TEST, TEST_START, seed=2, jitter=0.8), 1).picked(count)
 
 
 def _shell(room: Builder) -> None:
