@@ -7,7 +7,9 @@ process and for any number of threads; processors differ in a pixel in a thousan
 import contextlib
 import math
 import os
+import signal
 import tempfile
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ import numpy as np
 from PIL import Image
 
 from ...common import extras
+from ...common.errors import UserError
 from ._types import VERTEX_COLOUR, AreaLight, Material, Mesh, Room
 
 FIELD_OF_VIEW = math.radians(75)  # from left to right
@@ -42,6 +45,10 @@ class Renderer:
         import bpy  # pyright: ignore[reportMissingImports]: an extra
 
         self._bpy: Any = bpy
+        self._stopped = False
+        self._handlers: dict[int, Any] = {}
+        if threading.current_thread() is threading.main_thread():  # bpy has set its own when it was imported
+            self._handlers = {number: signal.signal(number, self._stop) for number in (signal.SIGINT, signal.SIGTERM)}
         self._folder = tempfile.TemporaryDirectory(prefix="viewbench-")
         with _quiet():
             bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -56,22 +63,37 @@ class Renderer:
         return self
 
     def __exit__(self, *error: object) -> None:
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
         self._folder.cleanup()
+
+    def _stop(self, number: int, frame: object) -> None:
+        """An exception in a render would end in Blender's own Python callbacks; so it waits for the picture."""
+        self._stopped = True
 
     def render(self, c2w: np.ndarray, samples: int, seed: int) -> np.ndarray:
         """(size, size, 3) uint8, sRGB, seen from a (4, 4) camera-to-world pose with OpenGL axes.
 
-        `samples` rays a pixel, then Open Image Denoise.
+        `samples` rays a pixel, then Open Image Denoise. Raises KeyboardInterrupt when the process was told to stop
+        since the picture before, and UserError where Blender could not write it.
         """
         import mathutils  # pyright: ignore[reportMissingImports]: comes with bpy
 
+        if self._stopped:
+            raise KeyboardInterrupt
         scene = self._bpy.context.scene
         self._camera.matrix_world = mathutils.Matrix(c2w.tolist())
         scene.cycles.samples, scene.cycles.seed = samples, seed
         picture = Path(self._folder.name) / "frame.png"
         scene.render.filepath = str(picture)
-        with _quiet():
-            self._bpy.ops.render.render(write_still=True)
+        picture.unlink(missing_ok=True)
+        try:
+            with _quiet():
+                ended = self._bpy.ops.render.render(write_still=True)
+        except RuntimeError as error:  # of the disk, as a rule
+            raise UserError(f"Blender could not render: {' '.join(str(error).split())}") from None
+        if ended != {"FINISHED"}:
+            raise KeyboardInterrupt
         with Image.open(picture) as image:
             return np.asarray(image.convert("RGB"))
 

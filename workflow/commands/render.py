@@ -17,18 +17,6 @@ ROOMS = "scenes.rooms"
 FRAMES = {"test": 40}  # and 400 of any other path
 
 
-def _list(context: click.Context, _: click.Parameter, asked: bool) -> None:
-    """Prints the rooms and ends the command."""
-    if not asked:
-        return
-    from ...common import plugins
-
-    names = plugins.names(ROOMS)
-    for name in names:
-        click.echo(f"{name:<{max(map(len, names))}}  {plugins.summary(ROOMS, name)}")
-    context.exit()
-
-
 def _shard(_: click.Context, __: click.Parameter, text: str) -> tuple[int, int]:
     found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
     if not found or not 1 <= int(found[1]) <= int(found[2]):
@@ -72,9 +60,8 @@ def _shard(_: click.Context, __: click.Parameter, text: str) -> tuple[int, int]:
     metavar="FILE",
     help="With --dry-run, a trajectory as TUM writes it to print as well; repeatable.",
 )
-@click.option("--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="Print the rooms.")
 def command(room: str, path: str, frames: int | None, **given: Any) -> None:
-    """Render ROOM along --path into --out: images, transforms with times, and points3d.ply.
+    """Render ROOM (viewbench list rooms) along --path into --out: images, transforms with times, points3d.ply.
 
     `--path test` adds test frames to a folder that has training frames. Several processes share a room by --shard.
     """
