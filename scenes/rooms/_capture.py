@@ -39,11 +39,7 @@ class Job:
     c2w: np.ndarray  # (N, 4, 4) OpenGL axes
     size: int  # pixels, both ways
     samples: int  # a pixel
-
-    @property
-    def split(self) -> str:
-        """Which frames of the capture these are."""
-        return "test" if self.path == "test" else "train"
+    split: str = "train"  # which frames of the capture these are, "train" or "test"
 
     def name(self, i: int) -> str:
         """Path of a frame's image from the capture's folder."""
@@ -89,7 +85,8 @@ def check_folder(out: Path, job: Job, room: Room) -> None:
     """Raises UserError where the folder has anything else than frames of this job, or of the other split's."""
     if os.path.lexists(out) and not out.is_dir():
         raise UserError(f"--out '{out}' is a file; name a folder")
-    if not out.is_dir() or not any(out.iterdir()):
+    # Another shard may just have begun: what it has before its record starts with a point.
+    if not out.is_dir() or all(file.name.startswith(".") for file in out.iterdir()):
         return
     files = {split: out / f"render_{split}.json" for split in ("train", "test")}
     if not any(file.is_file() for file in files.values()):
@@ -122,8 +119,8 @@ def write(
     """
     check_folder(out, job, room)
     folder = out / job.split
-    folder.mkdir(parents=True, exist_ok=True)
     write_json(out / f"render_{job.split}.json", job.record(room))
+    folder.mkdir(exist_ok=True)
     if not (out / POINTS).is_file():
         _points.write(out / POINTS, *points(room))
     frames = range(shard[0] - 1, len(job.times), shard[1])

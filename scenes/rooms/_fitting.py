@@ -54,7 +54,9 @@ def fitted(file: Path, room: Room, count: int) -> Fitted:
     steps = [np.linalg.norm(np.diff(values, axis=0), axis=1).max(initial=0.0) for values in (places, clear)]
     notes = [
         f"scaled by {scale:.3f} and turned by {np.degrees(angle):.0f} degrees into the free space",
-        f"{count_moved} of {count} poses moved, by up to {farthest:.2f} m, to be {CLEARANCE_M} m from everything",
+        f"{count_moved} of {count} poses moved, by up to {farthest:.2f} m, to be {CLEARANCE_M} m from everything"
+        if count_moved
+        else f"no pose moved: all are {CLEARANCE_M} m or more from everything",
         f"longest step between frames {steps[1]:.3f} m ({steps[0]:.3f} m before that)",
     ]
     if lost:

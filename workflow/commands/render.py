@@ -102,7 +102,8 @@ def _job(name: str, room: "Room", path: str, frames: int, given: dict[str, Any])
 
     if path in room.paths:
         walk = room.paths[path](frames)
-        return Job(name, path, walk.times, walk.c2w, given["size"], given["samples"])
+        split = "test" if path == "test" else "train"
+        return Job(name, path, walk.times, walk.c2w, given["size"], given["samples"], split)
     file = Path(path)
     if not file.is_file():
         raise UserError(f"--path '{path}' is neither a path of {name} ({', '.join(room.paths)}) nor a file")
