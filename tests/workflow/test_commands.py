@@ -24,6 +24,7 @@ def run(capsys, *arguments):
         ("reports", "reports"),
         ("formats", "scenes.formats"),
         ("encoders", "scenes.encoders"),
+        ("rooms", "scenes.rooms"),
     ],
 )
 def test_list_names_every_plugin(capsys, kind, package):

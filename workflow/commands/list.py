@@ -1,4 +1,4 @@
-"""List scenes, data sets, formats, selectors, encoders, backends, reports or studies."""
+"""List scenes, data sets, formats, selectors, encoders, backends, reports, studies or rooms."""
 
 from typing import TYPE_CHECKING
 
@@ -7,7 +7,7 @@ import click
 if TYPE_CHECKING:
     from ...common.settings import SceneEntry, Settings
 
-KINDS = ("scenes", "datasets", "formats", "selectors", "encoders", "backends", "reports", "studies")
+KINDS = ("scenes", "datasets", "formats", "selectors", "encoders", "backends", "reports", "studies", "rooms")
 
 
 @click.command()
@@ -20,6 +20,7 @@ def command(kind: str) -> None:
         "backends": _backends,
         "reports": _reports,
         "studies": _studies,
+        "rooms": _rooms,
     }
     rows = special.get(kind, lambda: _plugins(kind))()
     width = max((len(name) for name, _ in rows), default=0)
@@ -44,6 +45,15 @@ def _reports() -> list[tuple[str, str]]:
     reason = extras.missing("matplotlib", "jinja2")
     state = f" [unavailable: {reason}]" if reason else ""
     return [(name, plugins.summary("reports", name) + state) for name in plugins.names("reports")]
+
+
+def _rooms() -> list[tuple[str, str]]:
+    from ...common import plugins
+    from ...scenes.rooms._rendering import available
+
+    reason = available()
+    state = f" [unavailable: {reason}]" if reason else ""
+    return [(name, plugins.summary("scenes.rooms", name) + state) for name in plugins.names("scenes.rooms")]
 
 
 def _scenes() -> list[tuple[str, str]]:
