@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from ._noise import Array, byte_image, colour, mix, noise
+from ._noise import byte_image, colour, mix, noise
 
 SIZE = 768
 
 
-def _cells() -> tuple[Array, Array]:
+def _cells() -> tuple[np.ndarray, np.ndarray]:
     """(SIZE, SIZE) coordinates in [-1, 1) that are constant over stitches of 16 pixels."""
     y, x = np.mgrid[0:SIZE, 0:SIZE]
     return (x // 16) * 16 / SIZE * 2 - 1, (y // 16) * 16 / SIZE * 2 - 1
 
 
-def rug() -> Array:
+def rug() -> np.ndarray:
     """A woven rug of diamonds with a border."""
     u, v = _cells()
     palette = np.array([colour(text) for text in ("8c1c2b", "e6c678", "1f3a5f", "d9d2c0", "c4622d", "2f5d3a")])
@@ -22,7 +22,7 @@ def rug() -> Array:
     return byte_image(palette[kind] * (0.75 + 0.4 * noise(SIZE, SIZE, 27, 3, 128, 0.8))[..., None])
 
 
-def plaid() -> Array:
+def plaid() -> np.ndarray:
     """Blue plaid with yellow and red threads."""
     y, x = np.mgrid[0:SIZE, 0:SIZE]
     across, along = (0.5 + 0.5 * np.sign(np.sin(axis / SIZE * 24 * np.pi)) for axis in (x, y))
@@ -33,7 +33,7 @@ def plaid() -> Array:
     return byte_image(image * (0.7 + 0.5 * noise(SIZE, SIZE, 28, 3, 150, 0.9))[..., None])
 
 
-def cushion() -> Array:
+def cushion() -> np.ndarray:
     """Rings of two colours."""
     u, v = _cells()
     image = mix(colour("8b3a2a"), colour("e09a5a"), (np.sin((u * u + v * v) * 20) > 0).astype(float))

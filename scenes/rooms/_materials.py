@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterable
 
+import numpy as np
+
 from . import _cloth, _pictures, _surfaces
-from ._noise import Array
 from ._types import VERTEX_COLOUR, Material
 
-TEXTURES: dict[str, Callable[[], Array]] = {
+TEXTURES: dict[str, Callable[[], np.ndarray]] = {
     "floor": _surfaces.planks,
     "wallpaper": _surfaces.wallpaper,
     "plaster": _surfaces.plaster,
@@ -58,7 +59,7 @@ MATERIALS = {
 }
 
 
-def textures(materials: Iterable[Material]) -> dict[str, Array]:
+def textures(materials: Iterable[Material]) -> dict[str, np.ndarray]:
     """The textures that these materials name, each made anew."""
     named = {material.colour for material in materials if isinstance(material.colour, str)}
     return {name: make() for name, make in TEXTURES.items() if name in named}

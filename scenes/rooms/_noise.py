@@ -6,10 +6,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-Array = np.ndarray
 
-
-def noise(height: int, width: int, seed: int, octaves: int = 5, base: int = 4, gain: float = 0.5) -> Array:
+def noise(height: int, width: int, seed: int, octaves: int = 5, base: int = 4, gain: float = 0.5) -> np.ndarray:
     """(height, width) in [0, 1] of repeating fractal noise: grids of `base`, 2 `base`, … cells, each times `gain`."""
     random = np.random.default_rng(seed)
     total, weight, weights = np.zeros((height, width)), 1.0, 0.0
@@ -24,27 +22,27 @@ def noise(height: int, width: int, seed: int, octaves: int = 5, base: int = 4, g
     return np.clip(total / weights, 0, 1)
 
 
-def resized(values: Array, height: int, width: int) -> Array:
+def resized(values: np.ndarray, height: int, width: int) -> np.ndarray:
     """A grey image, float32 or uint8, resized bicubically."""
     return np.asarray(Image.fromarray(values).resize((width, height), Image.Resampling.BICUBIC))
 
 
-def stretched(values: Array, height: int, width: int) -> Array:
+def stretched(values: np.ndarray, height: int, width: int) -> np.ndarray:
     """(height, width) of values in [0, 1], resized in steps of 1 / 255."""
     return resized((values * 255).astype(np.uint8), height, width) / 255.0
 
 
-def colour(text: str) -> Array:
+def colour(text: str) -> np.ndarray:
     """(3,) in [0, 1] of six hexadecimal digits."""
     return np.array([int(text[i : i + 2], 16) for i in (0, 2, 4)]) / 255.0
 
 
-def mix(first: Array, second: Array, share: Array) -> Array:
+def mix(first: np.ndarray, second: np.ndarray, share: np.ndarray) -> np.ndarray:
     """(H, W, 3): between two colours, or images, by (H, W) `share` of the second."""
     return np.asarray(first)[None, None] * (1 - share[..., None]) + np.asarray(second)[None, None] * share[..., None]
 
 
-def between(first: str, second: str, share: float) -> Array:
+def between(first: str, second: str, share: float) -> np.ndarray:
     """(3,) colour between two."""
     return mix(colour(first), colour(second), np.full((1, 1), share))[0, 0]
 
@@ -55,7 +53,7 @@ def hsv(hue: float, saturation: float, value: float) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def byte_image(values: Array) -> Array:
+def byte_image(values: np.ndarray) -> np.ndarray:
     """(H, W, 3) uint8 of values in [0, 1], rounded."""
     return (np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8)
 

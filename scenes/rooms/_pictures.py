@@ -3,7 +3,7 @@
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from ._noise import Array, byte_image, colour, hsv, mix, noise, whole
+from ._noise import byte_image, colour, hsv, mix, noise, whole
 
 SIZE = 256  # pixels of one picture; `art` is two rows of four
 PRIMARY = ((220, 40, 30), (30, 60, 160), (240, 200, 40), (240, 235, 220), (240, 235, 220), (20, 20, 20))
@@ -11,7 +11,7 @@ SIGN = ("KITCHEN", "open daily", "No. 42", "Bread&Tea", "FRESH")
 SIGN_COLOURS = ((250, 220, 90), (240, 240, 240), (250, 120, 90), (140, 220, 200), (255, 255, 255))
 
 
-def art() -> Array:
+def art() -> np.ndarray:
     """Eight pictures: rectangles, a mosaic, hills, waves, a sign, discs, a clock, contour lines."""
     random = np.random.default_rng(31)
     rectangles, mosaic = _rectangles(random), _mosaic(random)
@@ -19,12 +19,12 @@ def art() -> Array:
     return byte_image(np.concatenate([np.concatenate(row, 1) for row in (pictures[:4], pictures[4:])]))
 
 
-def _grid() -> tuple[Array, Array]:
+def _grid() -> tuple[np.ndarray, np.ndarray]:
     y, x = np.mgrid[0 : 1 : SIZE * 1j, 0 : 1 : SIZE * 1j]
     return x, y
 
 
-def _rectangles(random: np.random.Generator) -> Array:
+def _rectangles(random: np.random.Generator) -> np.ndarray:
     canvas = Image.new("RGB", (SIZE, SIZE), (240, 235, 220))
     draw = ImageDraw.Draw(canvas)
 
@@ -45,7 +45,7 @@ def _rectangles(random: np.random.Generator) -> Array:
     return np.asarray(canvas) / 255
 
 
-def _mosaic(random: np.random.Generator) -> Array:
+def _mosaic(random: np.random.Generator) -> np.ndarray:
     """Voronoi cells with dark joints."""
     x, y = _grid()
     centres, colours = random.random((60, 2)), random.random((60, 3))
@@ -56,7 +56,7 @@ def _mosaic(random: np.random.Generator) -> Array:
     return image
 
 
-def _hills() -> Array:
+def _hills() -> np.ndarray:
     x, y = _grid()
     image = mix(colour("f7c873"), colour("3b5f9e"), 1 - y)
     for k, text in enumerate(("6b6f8f", "4d5a63", "2e4034", "1b2a1c")):
@@ -66,13 +66,13 @@ def _hills() -> Array:
     return image
 
 
-def _waves() -> Array:
+def _waves() -> np.ndarray:
     x, y = _grid()
     phases = (40 * np.hypot(x - 0.3, y - 0.4), 33 * np.hypot(x - 0.8, y - 0.7), 25 * (x + y))
     return np.stack([0.5 + 0.5 * np.sin(phase) for phase in phases], -1)
 
 
-def _sign() -> Array:
+def _sign() -> np.ndarray:
     canvas = Image.new("RGB", (SIZE, SIZE), (20, 40, 60))
     draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(34)
     for k, (text, fill) in enumerate(zip(SIGN, SIGN_COLOURS, strict=True)):
@@ -80,7 +80,7 @@ def _sign() -> Array:
     return np.asarray(canvas) / 255
 
 
-def _discs(random: np.random.Generator) -> Array:
+def _discs(random: np.random.Generator) -> np.ndarray:
     canvas = Image.new("RGB", (SIZE, SIZE), (236, 226, 200))
     draw = ImageDraw.Draw(canvas)
     for _ in range(70):
@@ -90,7 +90,7 @@ def _discs(random: np.random.Generator) -> Array:
     return np.asarray(canvas) / 255
 
 
-def _clock() -> Array:
+def _clock() -> np.ndarray:
     x, y = _grid()
     image = np.ones((SIZE, SIZE, 3)) * 0.93
     image[np.hypot(x - 0.5, y - 0.5) > 0.46] = colour("222222")
@@ -105,12 +105,12 @@ def _clock() -> Array:
     return image
 
 
-def _contours() -> Array:
+def _contours() -> np.ndarray:
     share = (np.sin(noise(SIZE, SIZE, 50, 6, 3, 0.6) * 40) > 0).astype(float)
     return mix(colour("f0e6d0"), colour("a03060"), share)
 
 
-def books() -> Array:
+def books() -> np.ndarray:
     """Four rows of 32 spines, 32 x 256 pixels each."""
     canvas = Image.fromarray(np.zeros((1024, 1024, 3), np.uint8))
     draw, random = ImageDraw.Draw(canvas), np.random.default_rng(60)
@@ -131,7 +131,7 @@ def books() -> Array:
     return np.asarray(canvas)
 
 
-def letters() -> Array:
+def letters() -> np.ndarray:
     """Two rows of four blocks, 128 pixels each."""
     canvas = Image.new("RGB", (512, 256))
     draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(96)

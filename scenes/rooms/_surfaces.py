@@ -5,12 +5,12 @@ import itertools
 import numpy as np
 from PIL import Image, ImageDraw
 
-from ._noise import Array, between, byte_image, colour, mix, noise, stretched, whole
+from ._noise import between, byte_image, colour, mix, noise, stretched, whole
 
 SIZE = 1024  # of the large ones, in pixels
 
 
-def planks() -> Array:
+def planks() -> np.ndarray:
     """A floor of twelve rows of wooden planks."""
     image, random = np.zeros((SIZE, SIZE, 3)), np.random.default_rng(1)
     spots = noise(SIZE, SIZE, 2, 6, 4)
@@ -32,7 +32,7 @@ def planks() -> Array:
     return byte_image(image)
 
 
-def wallpaper() -> Array:
+def wallpaper() -> np.ndarray:
     """Stripes with a motif."""
     y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
     wave = np.sin(x * 16 * np.pi) * np.sin(y * 16 * np.pi) + 0.5 * np.sin(x * 48 * np.pi + 2 * np.sin(y * 32 * np.pi))
@@ -42,7 +42,7 @@ def wallpaper() -> Array:
     return byte_image(image * (0.75 + 0.45 * noise(SIZE, SIZE, 5, 6, 8))[..., None])
 
 
-def plaster() -> Array:
+def plaster() -> np.ndarray:
     """Blue-green plaster with cracks and spots of paint."""
     patches = np.clip((noise(SIZE, SIZE, 7, 7, 4, 0.6) - 0.3) * 2, 0, 1)
     image = mix(colour("2f6f73"), colour("86b3a6"), patches)
@@ -56,7 +56,7 @@ def plaster() -> Array:
     return np.asarray(canvas)
 
 
-def brick() -> Array:
+def brick() -> np.ndarray:
     """Sixteen courses of bricks."""
     image, random = np.zeros((SIZE, SIZE, 3)), np.random.default_rng(11)
     high, wide = SIZE // 16, SIZE // 6
@@ -70,7 +70,7 @@ def brick() -> Array:
     return byte_image(image * (0.55 + 0.85 * stains)[..., None])
 
 
-def tiles() -> Array:
+def tiles() -> np.ndarray:
     """Eight by eight tiles with four kinds of ornament."""
     image, random = np.zeros((SIZE, SIZE, 3)), np.random.default_rng(13)
     side = SIZE // 8
@@ -94,13 +94,13 @@ def tiles() -> Array:
     return byte_image(image * (0.85 + 0.25 * noise(SIZE, SIZE, 14, 6, 8))[..., None])
 
 
-def ceiling() -> Array:
+def ceiling() -> np.ndarray:
     """Whitewash with stains."""
     share = np.clip((noise(SIZE, SIZE, 15, 8, 6, 0.7) - 0.3) * 2.2, 0, 1)
     return byte_image(mix(colour("b9b09f"), colour("f4f1ea"), share))
 
 
-def wood(seed: int, dark: str, light: str) -> Array:
+def wood(seed: int, dark: str, light: str) -> np.ndarray:
     """Wood with rings, between two colours."""
     grain = stretched(noise(48, SIZE, seed, 5, 6), 512, 512)
     y = np.mgrid[0:512, 0:512][0] / 512
@@ -108,7 +108,7 @@ def wood(seed: int, dark: str, light: str) -> Array:
     return byte_image(mix(colour(dark), colour(light), np.clip(0.35 * rings + 0.65 * grain, 0, 1)))
 
 
-def marble() -> Array:
+def marble() -> np.ndarray:
     """Dark marble with veins and specks."""
     y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
     veins = np.abs(np.sin((x * 3 + y * 2 + noise(SIZE, SIZE, 25, 7, 4, 0.6) * 4) * np.pi)) ** 0.35
@@ -117,17 +117,17 @@ def marble() -> Array:
     return byte_image(image)
 
 
-def leaf() -> Array:
+def leaf() -> np.ndarray:
     """A leaf's green."""
     return byte_image(mix(colour("1f4d1a"), colour("6fae3d"), noise(256, 256, 80, 5, 6, 0.7)))
 
 
-def steel() -> Array:
+def steel() -> np.ndarray:
     """Brushed steel."""
     return byte_image(mix(colour("8e9299"), colour("c2c6cc"), noise(256, 256, 81, 5, 3, 0.7)))
 
 
-def outside() -> Array:
+def outside() -> np.ndarray:
     """What is seen through a window: sky, trees and a lane."""
     y = np.mgrid[0:1:256j, 0:1:256j][0]
     clouds = np.clip(noise(256, 256, 70, 5, 3) * 1.6 - 0.4, 0, 1)
