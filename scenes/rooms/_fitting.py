@@ -18,7 +18,8 @@ TURNS = 24  # about the vertical that are tried
 PLACES = 9  # along x and along y that are tried
 SEARCHED = 200  # poses that the search looks at
 ROUNDS = 8  # of moving poses out of the way smoothly; after them the rest is moved at once
-SPREAD = 4.0  # frames over which a move is spread (the deviation of a Gaussian)
+SPREAD_S = 0.5  # over which a move is spread (the deviation of a Gaussian)
+MOST = 5_000  # rows of a trajectory that are fitted, unless more frames are wanted
 
 
 @dataclass(frozen=True)
@@ -33,35 +34,42 @@ class Fitted:
 def fitted(file: Path, room: Room, count: int) -> Fitted:
     """`count` rows of a TUM trajectory, evenly spread over its rows, in the room. z is up in both.
 
-    Every pose keeps CLEARANCE_M of everything. Raises UserError for a file that is no trajectory, fewer rows than
-    `count`, and a room without space for a camera.
+    The way is the same for any `count` up to MOST, since so many rows are fitted, of which frames are taken. Every pose
+    keeps CLEARANCE_M of everything. Raises UserError for a file that is no trajectory, fewer rows than `count`, and a
+    room without space for a camera.
     """
     path, lost = read_tum(file)
     if count > len(path):
         raise UserError(f"trajectory '{file}' has {len(path)} rows; --frames {count} is more")
-    rows = np.linspace(0, len(path) - 1, count).round().astype(int)
-    path = Trajectory(path.times[rows] - path.times[rows[0]], path.positions[rows], path.quaternions[rows])
+    path = _evenly(path, min(len(path), max(count, MOST)))
     free = space(room)
     if not len(free.points):
         raise UserError(f"the room has no place that is {CLEARANCE_M} m from everything; a path cannot be fitted")
     angle, scale, move = _placed(path.positions, free)
     turn = _about_z(angle)
     places = scale * (path.positions @ turn.T) + move
-    clear, count_moved, farthest = _moved_out(places, room, free)
+    spread = SPREAD_S / max(float(np.median(np.diff(path.times, append=path.times[-1] + 1))), 1e-3)
+    clear, count_moved, farthest = _moved_out(places, room, free, spread)
     c2w = path.poses @ OPENCV
     c2w[:, :3, :3] = turn @ c2w[:, :3, :3]
     c2w[:, :3, 3] = clear
-    steps = [np.linalg.norm(np.diff(values, axis=0), axis=1).max(initial=0.0) for values in (places, clear)]
+    chosen = np.linspace(0, len(path) - 1, count).round().astype(int)
+    steps = [np.linalg.norm(np.diff(values[chosen], axis=0), axis=1).max(initial=0.0) for values in (places, clear)]
     notes = [
         f"scaled by {scale:.3f} and turned by {np.degrees(angle):.0f} degrees into the free space",
-        f"{count_moved} of {count} poses moved, by up to {farthest:.2f} m, to be {CLEARANCE_M} m from everything"
+        f"{count_moved} of {len(path)} poses moved, by up to {farthest:.2f} m, to be {CLEARANCE_M} m from everything"
         if count_moved
         else f"no pose moved: all are {CLEARANCE_M} m or more from everything",
         f"longest step between frames {steps[1]:.3f} m ({steps[0]:.3f} m before that)",
     ]
     if lost:
         notes.insert(0, f"{lost} rows hold NaN and are left out")
-    return Fitted(path.times, c2w, tuple(notes))
+    return Fitted(path.times[chosen] - path.times[0], c2w[chosen], tuple(notes))
+
+
+def _evenly(path: Trajectory, count: int) -> Trajectory:
+    rows = np.linspace(0, len(path) - 1, count).round().astype(int)
+    return Trajectory(path.times[rows], path.positions[rows], path.quaternions[rows])
 
 
 def _about_z(angle: float) -> np.ndarray:
@@ -94,11 +102,11 @@ def _placed(positions: np.ndarray, free: Space) -> tuple[float, float, np.ndarra
     return best[1:]
 
 
-def _moved_out(places: np.ndarray, room: Room, free: Space) -> tuple[np.ndarray, int, float]:
+def _moved_out(places: np.ndarray, room: Room, free: Space, spread: float) -> tuple[np.ndarray, int, float]:
     """The places with their clearance, how many were moved by more than a millimetre, and the longest move in metres.
 
-    What is in the way goes to the nearest free place, its neighbours a part of that way; what is still in the way
-    after ROUNDS goes there alone.
+    What is in the way goes to the nearest free place, its neighbours a part of that way, which falls off over `spread`
+    rows; what is still in the way after ROUNDS goes there alone.
     """
     from scipy.ndimage import gaussian_filter1d
     from scipy.spatial import KDTree
@@ -115,6 +123,6 @@ def _moved_out(places: np.ndarray, room: Room, free: Space) -> tuple[np.ndarray,
             break
         way = np.zeros_like(clear)
         way[blocked] = goal - clear[blocked]
-        clear = clear + gaussian_filter1d(way, SPREAD, axis=0, mode="nearest")
+        clear = clear + gaussian_filter1d(way, spread, axis=0, mode="nearest")
     moved = np.linalg.norm(clear - places, axis=1)
     return clear, int((moved > 1e-3).sum()), float(moved.max())
