@@ -52,8 +52,8 @@ def triangulated(scene: Scene, indices: Sequence[int], progress: Progress = sile
         raise UserError(f"cameras are {scene.train.lens}, which is not triangulated; undistort the capture first")
     import pycolmap
 
-    views = scene.train.subset(np.sort(np.asarray(indices, dtype=np.int64)))
     order = np.sort(np.asarray(indices, dtype=np.int64))
+    views = scene.train.subset(order)
     pycolmap.logging.minloglevel = 2  # its own progress is written over ours
     with tempfile.TemporaryDirectory(prefix="viewbench-") as folder:
         work = Path(folder)

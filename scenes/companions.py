@@ -9,7 +9,7 @@ Tools find these by folder and name, so that a subset has them under the same on
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from .image_files import is_file, leaves
@@ -44,11 +44,11 @@ def first_of(root: Path, kind: str, names: Sequence[str]) -> tuple[Path | None, 
     return found if any(found) else ()
 
 
-def _in(folder: Path, name: str) -> list[str]:
-    """Names in the folder that belong to the image `name`."""
+def _in(folder: Path, name: str) -> Iterator[str]:
+    """Names in the folder that belong to the image `name`, each looked for when its turn comes."""
     pure = PurePosixPath(name)
     places = [name, *(f"{name}{end}" for end in SUFFIXES), *(pure.with_suffix(end).as_posix() for end in SUFFIXES)]
-    return [place for place in dict.fromkeys(places) if is_file(folder / place)]
+    return (place for place in dict.fromkeys(places) if is_file(folder / place))
 
 
 def smaller(root: Path, listed: Mapping[str, Sequence[str]]) -> tuple[list[tuple[Path, str]], list[str]]:

@@ -13,6 +13,7 @@ from .types import Scene
 
 REMEMBERED_BYTES = 1 << 26  # the hashes of larger scenes are kept: reading gigabytes again for every step takes hours
 KEPT_S = 90 * 86400.0  # and so long: hashes of scenes that nobody has opened since go
+MISSING = "missing"  # in place of the hash of a file that is not there
 SETTLED_S = 2.0  # a file changed less than that ago may change again without a new time
 
 
@@ -48,24 +49,23 @@ def file_sha256(path: Path) -> str:
 
 def _hashes(paths: list[Path]) -> list[str]:
     """SHA-256 of each file."""
-    there = [path for path in paths if path.exists()]
-    if len(there) < len(paths):  # whoever wants a picture's pixels says that it is gone; a hash can do without
-        found = dict(zip(there, _hashes(there), strict=True))
-        return [found.get(path, "missing") for path in paths]
     states = [_state(path) for path in paths]
-    if sum(state[0] for state in states) < REMEMBERED_BYTES:
-        return [sha256_file(path) for path in paths]
+    if sum(state[0] for state in states if state) < REMEMBERED_BYTES:
+        return [sha256_file(path) if state else MISSING for path, state in zip(paths, states, strict=True)]
     # Absolute and not resolved: two links to one file are two entries, and nothing has to be looked up for them.
     names = [os.fsencode(path.absolute()).hex() for path in paths]
     try:
         cache = user_cache("digests")
     except RuntimeError:  # nobody's home
-        return [sha256_file(path) for path in paths]
+        return [sha256_file(path) if state else MISSING for path, state in zip(paths, states, strict=True)]
     file = cache / f"{hashlib.sha256(chr(10).join(sorted(names)).encode()).hexdigest()[:32]}.json"
     known = _remembered(file)
     settled = time.time_ns() - SETTLED_S * 1e9
     result, fresh = [], {}
     for name, path, state in zip(names, paths, states, strict=True):
+        if not state:
+            result.append(MISSING)
+            continue
         entry = known.get(name)
         sha256 = entry[-1] if entry is not None and entry[:-1] == state else sha256_file(path)
         result.append(sha256)
@@ -81,8 +81,14 @@ def _hashes(paths: list[Path]) -> list[str]:
 
 
 def _state(path: Path) -> list[int]:
-    """Size, times of change in nanoseconds, and inode: what differs whenever the content was written anew."""
-    found = path.stat()
+    """Size, times of change in nanoseconds, and inode: what differs whenever the content was written anew.
+
+    Empty where there is no such file: whoever wants a picture's pixels says that it is gone, a hash can do without.
+    """
+    try:
+        found = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return []
     return [found.st_size, found.st_mtime_ns, found.st_ctime_ns, found.st_ino]
 
 

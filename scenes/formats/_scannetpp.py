@@ -1,5 +1,6 @@
 """What ScanNet++ has beside its DSLR's pictures: points in the world of those, and the iPhone's frames by ARKit."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,9 +8,9 @@ import numpy as np
 
 from ...common.errors import UserError
 from ...common.files import read_json
-from ..image_files import image_size, leaves
+from ..image_files import leaves
 from ..splits import LEAST_TRACK
-from ..types import Cameras, Points, Scene, Split
+from ..types import Points, Scene, Split
 from . import colmap
 from ._frames import natural, split
 from ._intrinsics import Intrinsics
@@ -83,13 +84,11 @@ def phone(root: Path, folder: Path) -> Scene:
     first = Intrinsics(k[0, 0, 0], k[0, 1, 1], k[0, 0, 2], k[0, 1, 2], f"'{file}'")
     depths = [there(folder / "depth", f"{name}.png") for name in names]
     made = split(root, paths, poses, first, depths=depths)
-    width, height = image_size(paths[0])
-    one = np.ones(len(paths), np.int64)
-    cameras = Cameras(made.cameras.c2w, k[:, 0, 0], k[:, 1, 1], k[:, 0, 2], k[:, 1, 2], width * one, height * one)
+    cameras = replace(made.cameras, fx=k[:, 0, 0], fy=k[:, 1, 1], cx=k[:, 0, 2], cy=k[:, 1, 2])
     masks = tuple(there(folder / "rgb_masks", f"{name}.png") for name in names)
     times = [row.get("timestamp") for row in rows]
     stamps = np.array(times, np.float64) if all(isinstance(time, (int, float)) for time in times) else None
-    train = Split(made.names, made.paths, cameras, stamps, "", made.depths, masks if any(masks) else ())
+    train = replace(made, cameras=cameras, times=stamps, masks=masks if any(masks) else ())
     dropped = len(every) - len(names)
     return Scene(
         name=root.name,

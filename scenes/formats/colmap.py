@@ -44,19 +44,16 @@ def _model(root: Path, number: int | None = None) -> Path | None:
         if number not in numbered:
             known = ", ".join(map(str, numbered)) or "none"
             raise UserError(f"'{root / 'sparse'}' has no model {number} (there are: {known}); name one of those")
-        return root / "sparse" / str(number)
+        return numbered[number]
     if len(numbered) > 1:
-        return root / "sparse" / str(max(numbered, key=lambda key: (numbered[key], -key)))
-    return next(
-        (root / folder for folder in (*MODELS, *(f"sparse/{key}" for key in numbered)) if _is_model(root / folder)),
-        None,
-    )
+        return numbered[max(numbered, key=lambda key: (_image_count(numbered[key]), -key))]
+    return next((path for path in (*(root / name for name in MODELS), *numbered.values()) if _is_model(path)), None)
 
 
-def _numbered(root: Path) -> dict[int, int]:
-    """Numbers of the models in sparse/, with how many images each has."""
+def _numbered(root: Path) -> dict[int, Path]:
+    """The models in sparse/ by their numbers, in order."""
     folders = [path for path in (root / "sparse").glob("[0-9]*") if path.name.isdecimal() and _is_model(path)]
-    return {int(path.name): _image_count(path) for path in sorted(folders, key=lambda path: int(path.name))}
+    return {int(path.name): path for path in sorted(folders, key=lambda path: int(path.name))}
 
 
 def _image_count(model: Path) -> int:
@@ -219,7 +216,7 @@ def _others(root: Path, model: Path) -> tuple[str, ...]:
     numbered = _numbered(root)
     if len(numbered) < 2 or model.parent != root / "sparse":
         return ()
-    counts = ", ".join(f"{key} with {count}" for key, count in numbered.items())
+    counts = ", ".join(f"{key} with {_image_count(path)}" for key, path in numbered.items())
     return (f"sparse/ has {len(numbered)} models (images: {counts}); {model.name} is read, --model names another",)
 
 

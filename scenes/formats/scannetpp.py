@@ -1,5 +1,6 @@
 """ScanNet++: the DSLR pictures of a scene (dslr/), undistorted where they are, or those of the iPhone (iphone/)."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -175,4 +176,4 @@ def _frames(
     made = split(root, paths, poses @ OPENCV, camera, depths=depths)
     named = [frame.get("mask_path") or f"{path.stem}.png" for frame, path in zip(frames, paths, strict=True)]
     hidden = tuple(there(masks, name) for name in named)
-    return Split(made.names, made.paths, made.cameras, None, made.lens, made.depths, hidden if any(hidden) else ())
+    return replace(made, masks=hidden if any(hidden) else ())

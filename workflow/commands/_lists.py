@@ -33,16 +33,16 @@ def kept(scene: Any, given: dict[str, Any]) -> list[int]:
     return _named(scene, "--keep", given["keep"])
 
 
-def allowed(scene: Any, given: dict[str, Any]) -> np.ndarray | None:
+def allowed(scene: Any, given: dict[str, Any], keep: Sequence[int]) -> np.ndarray | None:
     """(N,) bool, the training views that --exclude leaves; None where it is not given.
 
-    Raises UserError where a view is to be kept and excluded, and where nothing is left.
+    Raises UserError where a view of `keep` is excluded, and where nothing is left.
     """
     if not given["exclude"]:
         return None
     mask = np.ones(len(scene.train), dtype=bool)
     mask[_named(scene, "--exclude", given["exclude"])] = False
-    both = next((i for i in kept(scene, given) if not mask[i]), None)
+    both = next((i for i in keep if not mask[i]), None)
     if both is not None:
         raise UserError(f"view '{scene.train.names[both]}' is to be kept and excluded; take it out of one list")
     if not mask.any():

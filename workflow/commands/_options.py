@@ -12,7 +12,10 @@ import click
 from ...common.errors import UserError
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ...common.settings import Settings
+    from ...scenes.thinning import Thinning
     from ...scenes.types import Scene
 
 encoder_option = click.option("--encoder", metavar="NAME", help="Image encoder (viewbench list encoders).")
@@ -31,10 +34,18 @@ threads_option = click.option(
 
 
 def links_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Options --copy and --relative, of how images come into what is written."""
+    """Options --copy and --relative, of how images come into what is written; handed over as `links`, one of
+    `subset.LINKS`. Raises UserError for both."""
+
+    @functools.wraps(command)
+    def wrapped(copy: bool, relative: bool, **given: Any) -> None:
+        if copy and relative:
+            raise UserError("give either --copy or --relative: what is copied is not linked")
+        command(links="copy" if copy else "relative" if relative else "absolute", **given)
+
     copied = click.option("--copy", is_flag=True, help="Copy images instead of linking them.")
     related = click.option("--relative", is_flag=True, help="Link by relative paths, to move with the capture.")
-    return copied(related(command))
+    return copied(related(wrapped))
 
 
 def with_threads(settings: "Settings", threads: int | None) -> "Settings":
@@ -57,18 +68,24 @@ class Capture:
     stride: int = 1
     fps: float | None = None
 
+    @property
+    def thinning(self) -> "Thinning":
+        """What --stride and --fps say. Raises UserError for numbers that mean nothing."""
+        from ...scenes.thinning import Thinning
+
+        return Thinning(self.stride, self.fps)
+
     def open(self, settings: "Settings", notes: bool = True, pictures: bool = True) -> "Scene":
         """The scene; what its reader dropped or assumed is said on stderr unless `notes` is False.
 
         `pictures` False leaves a video's frames undecoded: what is said of it needs none.
         """
         from ...scenes.load import open_scene
-        from ...scenes.thinning import Thinning
 
         options: dict[str, Any] = {"format": self.format, "holdout": self.holdout, "allow_outside": self.allow_outside}
         options |= {"model": self.model, "poses": self.poses, "intrinsics": self.intrinsics, "times": self.times}
         options["video"] = {
-            "thinning": Thinning(self.stride, self.fps),
+            "thinning": self.thinning,
             "progress": progress("frames"),
             "extract": pictures,
         }
@@ -125,9 +142,18 @@ def thinning_options(command: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
+def looked_at(capture: Capture, scene: "Scene") -> "np.ndarray | None":
+    """(N,) bool, the training views that --stride or --fps leave; None for all, as of a video, which was read so."""
+    if scene.format == "video" or not capture.thinning:
+        return None
+    from ...scenes.thinning import candidates
+
+    return candidates(scene.train, capture.stride, capture.fps)
+
+
 def refuse_thinning(capture: Capture, scene: "Scene") -> None:
     """Raises UserError for --stride and --fps with a capture whose frames are all looked at by this command."""
-    if scene.format != "video" and (capture.stride > 1 or capture.fps is not None):
+    if scene.format != "video" and capture.thinning:
         raise UserError(f"--stride and --fps thin a video here, and '{capture.name}' is in format {scene.format}")
 
 

@@ -17,8 +17,7 @@ def command(
     scene: _options.Capture,
     out: Path,
     to: str,
-    copy: bool,
-    relative: bool,
+    links: str,
     force: bool,
 ) -> None:
     """Write all views of SCENE to --out in the format --to."""
@@ -28,7 +27,6 @@ def command(
     from ...scenes.subset import write_scene
 
     opened = scene.open(settings_file.load())
-    links = "copy" if copy else "relative" if relative else "absolute"
     for note in write_scene(opened, np.arange(len(opened.train)), out, to, links, force):
         click.echo(f"viewbench: {note}", err=True)
     if to == "colmap" and opened.points is None:

@@ -40,7 +40,6 @@ def command(**given: Any) -> None:
 
     from ...common import settings as settings_file
     from ...common.errors import UserError
-    from ...scenes.thinning import candidates
     from ...scenes.validate import check_present
     from ...selectors import _covering, _redundancy, _run
 
@@ -56,8 +55,8 @@ def command(**given: Any) -> None:
         _choice_options.check_file("--plot", given["plot"])
     settings = settings_file.load()
     scene = given["scene"].open(settings)
-    if scene.format != "video" and (given["scene"].stride > 1 or given["scene"].fps is not None):
-        looked_at = candidates(scene.train, given["scene"].stride, given["scene"].fps)
+    looked_at = _options.looked_at(given["scene"], scene)
+    if looked_at is not None:
         scene = replace(scene, train=scene.train.subset(np.flatnonzero(looked_at)))
     parameters = _choice_options.parameters_of(given)
     _run.checked(scene, "maxmin", 1, parameters)

@@ -55,6 +55,8 @@ def command(**given: Any) -> None:
     How many: a share (--ratio), a number (--count), or as many as it takes (--auto), which `viewbench redundancy SCENE`
     shows beforehand. --plot and --sheet show what was chosen.
     """
+    import numpy as np
+
     from ...common import settings as settings_file
     from ...common.files import sealed, write_json
     from ...scenes.subset import check_target, written_format  # no source: it writes what was chosen
@@ -74,15 +76,17 @@ def command(**given: Any) -> None:
     if isinstance(parameters.get("factors"), str):
         parameters["factors"] = [parameters["factors"]]
     _run.checked(scene, given["selector"], count, parameters, given["auto"])
-    keep, candidates = _lists.kept(scene, given), _candidates(scene, given)
+    keep = _lists.kept(scene, given)
+    candidates = _candidates(scene, given, keep)
     if writes:
         check_target(scene, given["out"], written_format(scene), given["force"])
-    looked_at = _looked_at(scene, candidates, keep)
+    # The others' images are not even opened.
+    looked_at = scene if candidates is None else replace(scene, train=scene.train.subset(np.flatnonzero(candidates)))
     check_present(looked_at)
     looks = _looks(scene, given, writes)
     features = _choice_options.features_of(looked_at, given["selector"], given, parameters, settings)
     sharp = _choice_options.sharpness_of(looked_at, settings) if parameters.get("sharpness") else None
-    features, sharp = _of_all(features, n, candidates, keep), _of_all(sharp, n, candidates, keep)
+    features, sharp = _of_all(features, candidates), _of_all(sharp, candidates)
 
     def choose(number: int | None) -> dict[str, Any]:
         return _run.run(
@@ -118,9 +122,7 @@ def command(**given: Any) -> None:
         _matches.check(scene, record, given["out"] if writes else None, given["selection"])
     if given["plot"] or given["sheet"]:
         if features is None and not scene.posed:
-            features = _of_all(
-                _choice_options.features_of(looked_at, "maxmin", given, {}, settings), n, candidates, keep
-            )
+            features = _of_all(_choice_options.features_of(looked_at, "maxmin", given, {}, settings), candidates)
         _draw(given, scene, record, features)
     if writes:
         click.echo(f"viewbench: {record['count']} of {n} views are in {given['out']}; in the order chosen:", err=True)
@@ -140,8 +142,6 @@ def _check_options(given: dict[str, Any]) -> None:
         raise UserError("give --out FOLDER, or --dry-run to see the choice without writing it")
     if given["auto"] is not None and given["max_gap"] is not None:
         raise UserError("--max-gap fills gaps of a count; give --ratio or --count in place of --auto")
-    if given["copy"] and given["relative"]:
-        raise UserError("give either --copy or --relative: what is copied is not linked")
     if given["plot"]:
         from ...reports._selection_plot import kind_of  # no source: it draws what was chosen
 
@@ -156,44 +156,26 @@ def _check_options(given: dict[str, Any]) -> None:
         _choice_options.check_folder("--out", given["out"].absolute().parent)
 
 
-def _candidates(scene: Any, given: dict[str, Any]) -> Any:
-    """(N,) bool, the views that may be chosen: those looked at (--stride, --fps) and not excluded; None for all.
-
-    Of a video those looked at are all that was read.
-    """
-    from ...scenes.thinning import candidates
-
-    capture, allowed = given["scene"], _lists.allowed(scene, given)
-    if scene.format == "video" or (capture.stride == 1 and capture.fps is None):
-        return allowed
-    looked_at = candidates(scene.train, capture.stride, capture.fps)
-    return looked_at if allowed is None else looked_at & allowed
+def _candidates(scene: Any, given: dict[str, Any], keep: list[int]) -> Any:
+    """(N,) bool, the views that may be chosen: looked at (--stride, --fps) and not excluded, or kept; None for all."""
+    masks = [_options.looked_at(given["scene"], scene), _lists.allowed(scene, given, keep)]
+    masks = [mask for mask in masks if mask is not None]
+    if not masks:
+        return None
+    allowed = masks[0] & masks[-1]
+    allowed[keep] = True
+    return allowed
 
 
-def _looked_at(scene: Any, candidates: Any, keep: list[int]) -> Any:
-    """The scene with those training views alone that may be chosen: the others' images are not even opened."""
-    if candidates is None:
-        return scene
-    return replace(scene, train=scene.train.subset(_indices(candidates, keep)))
-
-
-def _of_all(values: Any, n: int, candidates: Any, keep: list[int]) -> Any:
+def _of_all(values: Any, candidates: Any) -> Any:
     """(N, …) values of all training views, of which those that were not looked at are ones that nobody reads."""
     import numpy as np
 
-    if values is None or candidates is None or len(values) == n:
+    if values is None or candidates is None or len(values) == len(candidates):
         return values
-    every = np.ones((n, *values.shape[1:]), dtype=values.dtype)
-    every[_indices(candidates, keep)] = values
+    every = np.ones((len(candidates), *values.shape[1:]), dtype=values.dtype)
+    every[candidates] = values
     return every
-
-
-def _indices(candidates: Any, keep: list[int]) -> Any:
-    import numpy as np
-
-    allowed = candidates.copy()
-    allowed[keep] = True
-    return np.flatnonzero(allowed)
 
 
 def _looks(scene: Any, given: dict[str, Any], writes: bool) -> bool:
@@ -234,8 +216,7 @@ def _write(scene: Any, record: dict[str, Any], given: dict[str, Any]) -> None:
         after = 0 if scene.points is None else len(scene.points)
         few = "; that is few to start training from" if after < FEW_POINTS else ""
         click.echo(f"viewbench: {after:,} points ({given['points']}) in place of {before:,}{few}", err=True)
-    links = "copy" if given["copy"] else "relative" if given["relative"] else "absolute"
-    written, notes = write_subset(scene, record, given["out"], links, given["force"])
+    written, notes = write_subset(scene, record, given["out"], given["links"], given["force"])
     if written != scene.format:
         notes.insert(0, f"format {scene.format} is only read; the subset is written as {written}")
     for note in notes:
