@@ -35,15 +35,16 @@ class Stay:
     looks: tuple[RGB, ...]
 
 
-def steered(events: Sequence[Go | Stay], start: RGB, seed: int, jitter: float = 1.0) -> Walk:
+def steered(events: Sequence[Go | Stay], start: RGB, seed: int, jitter: float = 1.0, look_s: float = LOOK_S) -> Walk:
     """A path as a person with a camera in hand goes it: the events in order, smoothed, with jitter and bobbing.
 
-    `jitter` scales the deviation. The poses are STEPS_PER_S a second.
+    `jitter` scales the deviation; `look_s` is the deviation in seconds of the Gaussian that smooths the direction, so
+    the longer it is the slower the camera turns. The poses are STEPS_PER_S a second.
     """
     places, looks = _followed(events, np.array(start, dtype=np.float64))
     n = len(places)
     directions = looks - places
-    directions = smoothed(_unit(directions), LOOK_S * STEPS_PER_S)
+    directions = smoothed(_unit(directions), look_s * STEPS_PER_S)
     places = smoothed(places, PLACE_S * STEPS_PER_S)
     shake = smoothed(_jitter(n, seed, jitter), JITTER_SMOOTHED_S * STEPS_PER_S)
     speed = np.r_[0, np.linalg.norm(np.diff(places, axis=0), axis=1)] * STEPS_PER_S
