@@ -30,6 +30,7 @@ class SceneEntry:
     intrinsics: str = ""  # fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]
     times: str = ""  # times of the images, where their names have none
     room: str = ""  # where it was captured: two walks through one room are one sample of rooms
+    walk: str = ""  # how the camera went ("human", "smooth"): tables over rooms show each way by itself
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,11 @@ class Settings:
         """The room that a scene was captured in: the scene itself where nothing names one."""
         entry = self.entry(scene)
         return (entry.room if entry else "") or scene
+
+    def walk_of(self, scene: str) -> str:
+        """How the camera went in a scene; empty where nothing says so."""
+        entry = self.entry(scene)
+        return entry.walk if entry else ""
 
 
 def _of_catalogue(scene: str) -> SceneEntry | None:

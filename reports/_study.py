@@ -55,12 +55,14 @@ class SceneInfo:
 
     name: str
     room: str
+    walk: str  # how the camera went; empty where nothing says so
     n_train: int
     n_test: int
     train_positions: list[list[float]]  # (n_train, 3) scene units
     train_forward: list[list[float]]  # (n_train, 3) unit viewing directions
     test_positions: list[list[float]]  # (n_test, 3)
     points: list[list[float]]  # (P, 6) x, y, z, r, g, b; empty where the scene has none
+    seen: tuple[float, ...]  # (n_test,) shares of the pixels that training views see; empty where it is not known
     truth: Path  # folder of the test images as they were compared with; may be absent
 
 
@@ -147,12 +149,14 @@ class Study:
             return SceneInfo(
                 name=name,
                 room=record.get("room") or name,
+                walk=record.get("walk") or "",
                 n_train=record["n_train"],
                 n_test=record["n_test"],
                 train_positions=record["train"]["positions"],
                 train_forward=record["train"]["forward"],
                 test_positions=record["test"]["positions"],
                 points=record["points"] or [],
+                seen=tuple(record.get("seen") or ()),
                 truth=path.with_suffix(""),
             )
         except (KeyError, TypeError) as error:

@@ -1,42 +1,102 @@
 """Does a way of choosing win in rooms that were not tried? Differences to plain choice, with rooms as the sample."""
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
-from . import _findings, _tables
+from matplotlib.axes import Axes
+from matplotlib.ticker import NullLocator
+
+from . import _figures, _findings, _tables
 from ._items import Item
-from ._statistics import Difference, interval, over_samples, signed
+from ._rooms import ALL, OverRooms, groups, over_rooms
+from ._statistics import interval, signed
 from ._study import Study, percent
+from ._style import Style, styles
 from ._tables import Entry, Table
 
 ORDER = 15
-LEAST = 2  # rooms: fewer are no sample
-VERDICTS = ("better", "not told apart", "worse")  # of a scene by its seeds: wins, level, losses
-
-
-@dataclass(frozen=True)
-class OverRooms:
-    """What one selector gains over a baseline, in dB, room by room."""
-
-    rooms: dict[str, float]  # the mean over the room's scenes
-    mean: Difference  # over rooms, each counted once, with the interval that rooms give
-    counts: tuple[int, int, int]  # scenes that it wins, that the seeds cannot tell apart, that it loses
-
-    @property
-    def left_out(self) -> tuple[float, float]:
-        """The lowest and the highest mean when one room is left out."""
-        total, n = math.fsum(self.rooms.values()), len(self.rooms)
-        means = [(total - value) / (n - 1) for value in self.rooms.values()]
-        return min(means), max(means)
+NAME = "over_rooms"
+SPREAD = 0.035  # between selectors at a ratio, of the axis
 
 
 def build(study: Study, out: Path) -> list[Item]:
-    """One table; nothing for a study of scenes in a single room."""
-    rooms = {scene: study.scene(scene).room for scene in {scene for _, scene in study.panels()}}
-    if len(set(rooms.values())) < LEAST:
-        return []
+    """A figure against every n-th frame and a table for each way of walking; nothing where all is in a single room."""
+    items = []
+    for walk, rooms in groups(study).items():
+        if walk == ALL:
+            items += [_figure(study, baseline, out) for baseline in _findings.BASELINES[:1]]
+        items.append(_table(study, walk, rooms, out))
+    return [item for item in items if item is not None]
+
+
+def _figure(study: Study, baseline: str, out: Path) -> Item | None:
+    """Mean difference to `baseline` over the ratio, a panel for each backend and way of walking."""
+    if baseline not in study.selectors:
+        return None
+    drawn = styles(name for name in study.selectors if name != baseline)
+    panels, records = [], []
+    for backend in study.backends:
+        for walk, rooms in groups(study).items():
+            found = {
+                name: {
+                    ratio: item
+                    for ratio in study.ratios_of(backend)
+                    if (item := over_rooms(study, rooms, backend, name, baseline, (ratio,)))
+                }
+                for name in drawn
+            }
+            if any(found.values()):
+                panels.append((_panel_title(study, backend, walk), found))
+                for name, by_ratio in found.items():
+                    for ratio, item in by_ratio.items():
+                        records += _records(walk, backend, name, baseline, percent(ratio), item)
+    if not panels:
+        return None
+    with _figures.look():
+        figure, axes = _figures.grid(len(panels), 4.3, 3.5)
+        for place, (title, found) in zip(axes, panels, strict=True):
+            _panel(place, found, drawn)
+            place.set(title=title, xlabel="training views", ylabel=f"Δ PSNR to {baseline} (dB)")
+        _figures.share_heights(axes, 3)
+        _figures.legend(figure, {name: drawn[name] for name in drawn if any(found[name] for _, found in panels)})
+        files = _figures.save(figure, out, NAME, records)
+    caption = (
+        f"Difference of mean PSNR to {baseline} (the line at 0), the mean over rooms; above the line is better. Bars: "
+        "the 95 % interval (Student's) with rooms as the sample, which is what another room of this kind might give; "
+        "small marks: each room's own difference, the mean of its seeds and walks. At a ratio the selectors stand side "
+        "by side so that their bars can be told apart."
+    )
+    return Item("Differences over rooms", "figure", caption, files)
+
+
+def _panel_title(study: Study, backend: str, walk: str) -> str:
+    parts = [] if len(study.backends) == 1 else [backend]
+    return " · ".join([*parts, "all walks" if walk == ALL else f"{walk} walks"])
+
+
+def _panel(axes: Axes, found: Mapping[str, Mapping[float, OverRooms]], drawn: Mapping[str, Style]) -> None:
+    ratios = sorted({ratio for by_ratio in found.values() for ratio in by_ratio})
+    shown = [name for name in drawn if found[name]]
+    axes.axhline(0, color="black", linewidth=1)
+    for place, name in enumerate(shown):
+        style, by_ratio = drawn[name], found[name]
+        shift = 1 + SPREAD * (2 * place - len(shown) + 1)
+        at = [ratio * shift for ratio in by_ratio]
+        means = [item.mean.mean for item in by_ratio.values()]
+        bars = [0.0 if item.mean.high is None else item.mean.high - item.mean.mean for item in by_ratio.values()]
+        axes.errorbar(
+            at, means, bars, color=style.colour, marker=style.marker, linestyle=style.dash, elinewidth=1.2, capsize=2
+        )
+        for x, item in zip(at, by_ratio.values(), strict=True):
+            values = list(item.rooms.values())
+            axes.plot([x] * len(values), values, "_", color=style.colour, markersize=4, alpha=0.7)
+    axes.set_xscale("log")
+    axes.set_xticks(ratios, [percent(ratio) for ratio in ratios])
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+def _table(study: Study, walk: str, rooms: Mapping[str, str], out: Path) -> Item | None:
     baselines = [name for name in _findings.BASELINES if name in study.selectors]
     others = [name for name in study.selectors if name not in _findings.BASELINES]
     rows, records = [], []
@@ -52,7 +112,7 @@ def build(study: Study, out: Path) -> list[Item]:
                 for ratio in study.ratios if len(study.ratios) > 1 else ():
                     part = over_rooms(study, rooms, backend, selector, baseline, (ratio,)) if ratio in ratios else None
                     row.append(Entry("") if part is None else Entry(interval(part.mean), part.mean.mean))
-                    records += [] if part is None else _records(backend, selector, baseline, percent(ratio), part)
+                    records += [] if part is None else _records(walk, backend, selector, baseline, percent(ratio), part)
                 low, high = total.left_out
                 row += [
                     Entry(interval(total.mean), total.mean.mean),
@@ -61,40 +121,22 @@ def build(study: Study, out: Path) -> list[Item]:
                     Entry(total.mean.verdict, total.mean.mean),
                 ]
                 rows.append(tuple(row))
-                records += _records(backend, selector, baseline, "all", total)
+                records += _records(walk, backend, selector, baseline, "all", total)
     if not rows:
-        return []
+        return None
     head = ["backend"] if len(study.backends) > 1 else []
     labels = [*head, "selector", "against", "rooms"]
     parts = [f"Δ at {percent(ratio)} (95 % interval)" for ratio in study.ratios] if len(study.ratios) > 1 else []
     end = ("Δ over all (95 % interval)", "won / level / lost", "without one room", "in words")
     table = Table((*labels, *parts, *end), tuple(rows), len(labels))
-    files = _tables.save(table, out, "table_over_rooms", records)
-    return [Item("Differences over rooms", "table", _caption(rooms), files, table)]
+    name, title = ("table_over_rooms", "Differences over rooms")
+    if walk != ALL:
+        name, title = name + "_" + re.sub(r"\W+", "-", walk), f"{title}: {walk} walks"
+    files = _tables.save(table, out, name, records)
+    return Item(title, "table", _caption(rooms), files, table)
 
 
-def over_rooms(
-    study: Study, rooms: dict[str, str], backend: str, selector: str, baseline: str, ratios: Sequence[float]
-) -> OverRooms | None:
-    """The differences of mean PSNR in dB, averaged over `ratios`, then over the scenes of each room, then over rooms.
-
-    None where fewer than two rooms have both sides.
-    """
-    found: dict[str, list[float]] = {}
-    verdicts: list[str] = []
-    for scene in study.scenes:
-        if scene in rooms and (item := _findings.against(study, backend, scene, selector, baseline, tuple(ratios))):
-            found.setdefault(rooms[scene], []).append(item.mean)
-            verdicts.append(item.verdict)
-    if len(found) < LEAST:
-        return None
-    means = {room: math.fsum(values) / len(values) for room, values in found.items()}
-    counts = [sum(verdict == word for verdict in verdicts) for word in VERDICTS]
-    counts[1] = len(verdicts) - counts[0] - counts[2]  # a single sample tells nothing either
-    return OverRooms(means, over_samples(list(means.values())), (counts[0], counts[1], counts[2]))
-
-
-def _caption(rooms: dict[str, str]) -> str:
+def _caption(rooms: Mapping[str, str]) -> str:
     shared = {room for room in rooms.values() if list(rooms.values()).count(room) > 1}
     several = " Walks through one room are averaged and count as one." if shared else ""
     return (
@@ -106,8 +148,10 @@ def _caption(rooms: dict[str, str]) -> str:
     )
 
 
-def _records(backend: str, selector: str, baseline: str, ratio: str, found: OverRooms) -> list[dict[str, object]]:
-    common = {"backend": backend, "selector": selector, "against": baseline, "ratio": ratio}
+def _records(
+    walk: str, backend: str, selector: str, baseline: str, ratio: str, found: OverRooms
+) -> list[dict[str, object]]:
+    common = {"walk": walk or "all", "backend": backend, "selector": selector, "against": baseline, "ratio": ratio}
     low, high = found.left_out
     over_all = {
         "low_95_db": found.mean.low,

@@ -103,6 +103,10 @@ class Wiring:
         """The room that the scene was captured in."""
         return self.settings.room_of(wildcards.scene)
 
+    def walk(self, wildcards: Any) -> str:
+        """How the camera went in the scene."""
+        return self.settings.walk_of(wildcards.scene)
+
     @cached_property
     def truth_width(self) -> int:
         """Width of the ground truth beside the renders in the reports: the study's widest."""

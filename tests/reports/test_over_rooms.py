@@ -8,7 +8,7 @@ from scipy import stats
 
 from tests.conftest import known
 from tests.reports.fixtures import make_study
-from viewbench.reports import over_rooms
+from viewbench.reports import _rooms, over_rooms, scenes
 from viewbench.reports._statistics import over_samples
 from viewbench.reports._study import load
 
@@ -20,11 +20,11 @@ def study(tmp_path):
     return make_study(tmp_path, scenes=SCENES)
 
 
-def rename(folder, **rooms):
-    """Writes the rooms of scenes into their descriptions."""
-    for scene, room in rooms.items():
+def rename(folder, key="room", **values):
+    """Writes the rooms, or something else, of scenes into their descriptions."""
+    for scene, value in values.items():
         path = folder / "scenes" / f"{scene}.json"
-        path.write_text(json.dumps(json.loads(path.read_text()) | {"room": room}))
+        path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
 
 
 def means(study, selector, ratios):
@@ -46,7 +46,7 @@ def means(study, selector, ratios):
 def test_rooms_are_the_sample(study):
     read = load(study)
     rooms = {scene: scene for scene in SCENES}
-    found = known(over_rooms.over_rooms(read, rooms, "splat", "maxmin", "uniform", read.ratios))
+    found = known(_rooms.over_rooms(read, rooms, "splat", "maxmin", "uniform", read.ratios))
     apart = means(read, "maxmin", read.ratios) - means(read, "uniform", read.ratios)
     wanted = stats.ttest_1samp(apart, 0).confidence_interval(0.95)
     interval = [found.mean.mean, known(found.mean.low), known(found.mean.high)]
@@ -59,7 +59,7 @@ def test_rooms_are_the_sample(study):
 def test_two_walks_through_one_room_count_once(study):
     read = load(study)
     rooms = {"a": "one", "b": "one", "c": "c", "d": "d"}
-    found = known(over_rooms.over_rooms(read, rooms, "splat", "maxmin", "random", (0.1,)))
+    found = known(_rooms.over_rooms(read, rooms, "splat", "maxmin", "random", (0.1,)))
     apart = means(read, "maxmin", (0.1,)) - means(read, "random", (0.1,))
     merged = np.array([apart[:2].mean(), apart[2], apart[3]])
     np.testing.assert_allclose(list(found.rooms.values()), merged)
@@ -69,7 +69,8 @@ def test_two_walks_through_one_room_count_once(study):
 
 def test_the_table_is_there_for_two_rooms_and_not_for_one(study, tmp_path):
     read = load(study)
-    (item,) = over_rooms.build(read, tmp_path)
+    figure, item = over_rooms.build(read, tmp_path)
+    assert figure.kind == "figure"
     table = known(item.table)
     assert [row[0].text for row in table.rows] == ["coverage", "logdet", "maxmin"] * 2
     assert all(row[2].text == "4" for row in table.rows)
@@ -77,24 +78,66 @@ def test_the_table_is_there_for_two_rooms_and_not_for_one(study, tmp_path):
     rows = (tmp_path / item.files[0]).read_text().splitlines()
     assert len(rows) == 1 + 2 * 3 * (len(read.ratios) + 1) * (4 + 1)
     rename(study, a="one", b="one", c="one", d="two")
-    (item,) = over_rooms.build(load(study), tmp_path)
+    _, item = over_rooms.build(load(study), tmp_path)
     assert known(item.table).rows[0][2].text == "2"
     assert "count as one" in item.caption
     rename(study, d="one")
     assert over_rooms.build(load(study), tmp_path) == []
 
 
+def test_each_way_of_walking_is_shown_by_itself(study, tmp_path):
+    rename(study, "walk", a="human", b="by / hand", c="human", d="by / hand")
+    rename(study, a="one", b="one", c="two", d="two")
+    read = load(study)
+    items = over_rooms.build(read, tmp_path)
+    assert [item.title for item in items if item.table] == [
+        "Differences over rooms",
+        "Differences over rooms: human walks",
+        "Differences over rooms: by / hand walks",
+    ]
+    assert all((tmp_path / name).is_file() for item in items for name in item.files)
+    found = [
+        _rooms.over_rooms(read, rooms, "splat", "maxmin", "uniform", (0.1,)) for rooms in _rooms.groups(read).values()
+    ]
+    both, human, hand = (known(item).mean.mean for item in found)
+    assert both == pytest.approx((human + hand) / 2)
+    assert human != pytest.approx(hand)
+    rename(study, "walk", b="", d="")
+    assert len(over_rooms.build(load(study), tmp_path)) == 2, "one way alone is the study itself"
+
+
+def test_the_figure_shows_what_the_table_says(study, tmp_path):
+    read = load(study)
+    figure, item = over_rooms.build(read, tmp_path)
+    files = [next(name for name in shown.files if name.endswith(".csv")) for shown in (figure, item)]
+    drawn, listed = ((tmp_path / name).read_text().splitlines() for name in files)
+    assert drawn[0] == listed[0]
+    assert {line for line in drawn[1:] if "splat,random," not in line} < set(listed[1:])
+    assert any("splat,random," in line for line in drawn), "random choice is drawn too"
+
+
+def test_scenes_are_listed_with_what_is_seen_of_their_test_views(study, tmp_path):
+    (item,) = scenes.build(load(study), tmp_path)
+    assert known(item.table).columns == ("scene", "room", "training views", "test views")
+    assert "seen" not in item.caption
+    rename(study, "seen", a=[0.9, 0.7, 1.0], c=[1.0, 1.0, 1.0])
+    (item,) = scenes.build(load(study), tmp_path)
+    rows = {row[0].text: [entry.text for entry in row[-3:]] for row in known(item.table).rows}
+    assert rows == {"a": ["86.7 %", "70.0 %", "1"], "b": [""] * 3, "c": ["100.0 %", "100.0 %", "0"], "d": [""] * 3}
+    assert "0.9000 0.7000 1.0000" in (tmp_path / item.files[0]).read_text()
+
+
 def test_a_room_that_lacks_a_side_is_left_out(tmp_path):
     failed = tuple(("splat", "d", "maxmin", None, seed) for seed in (0, 1, 2))
     read = load(make_study(tmp_path, scenes=SCENES, failed=failed))
     rooms = {scene: scene for scene in SCENES}
-    assert set(known(over_rooms.over_rooms(read, rooms, "splat", "maxmin", "uniform", read.ratios)).rooms) == {
+    assert set(known(_rooms.over_rooms(read, rooms, "splat", "maxmin", "uniform", read.ratios)).rooms) == {
         "a",
         "b",
         "c",
     }
     only = {scene: scene for scene in ("a", "d")}
-    assert over_rooms.over_rooms(read, only, "splat", "maxmin", "uniform", read.ratios) is None
+    assert _rooms.over_rooms(read, only, "splat", "maxmin", "uniform", read.ratios) is None
 
 
 def test_one_sample_and_equal_samples_have_no_interval():

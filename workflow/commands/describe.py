@@ -43,6 +43,7 @@ def command(scene: _options.Capture, out: Path, width: int | None) -> None:
         "scene": opened.name,
         "dataset": settings.dataset_of(scene.name, opened.name),
         "room": settings.room_of(scene.name),
+        "walk": settings.walk_of(scene.name),
         "format": opened.format,
         "holdout": opened.holdout,
         "n_train": len(opened.train),
@@ -54,8 +55,20 @@ def command(scene: _options.Capture, out: Path, width: int | None) -> None:
         "train": split(opened.train),
         "test": split(opened.test),
         "points": points,
+        "seen": _seen(opened.root, opened.test.names),
     }
     write_json(out, record)
+
+
+def _seen(root: Path, names: tuple[str, ...]) -> list[float] | None:
+    """Of each test view the share of its pixels that training views see, where a rendered capture says so."""
+    from ...common.files import read_json
+
+    file = root / "seen_test.json"
+    if not file.is_file():
+        return None
+    shares = read_json(file, "shares")["seen"]
+    return [shares[name] for name in names] if all(name in shares for name in names) else None
 
 
 def _write_truth(test, width: int, folder: Path) -> None:

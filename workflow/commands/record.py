@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+FIGURES = ("psnr_over_ratio", "over_rooms")  # of those that the study has
 VERSIONS = ("viewbench", "numpy", "numba", "torch")  # of those that are installed
 
 
@@ -14,7 +15,7 @@ VERSIONS = ("viewbench", "numpy", "numba", "torch")  # of those that are install
 @click.option("--command", "commands", multiple=True, help="Command that made the results; repeatable.")
 @click.option("--note", default="", help="What a reader must know.")
 def command(folder: Path, name: str | None, into: Path | None, commands: tuple[str, ...], note: str) -> None:
-    """Copy results.csv and the main figure of the study in FOLDER, with machine and versions, into the recordings."""
+    """Copy results.csv and the main figures of the study in FOLDER, with machine and versions, into the recordings."""
     import importlib.util
     import shutil
     from importlib import metadata
@@ -44,8 +45,8 @@ def command(folder: Path, name: str | None, into: Path | None, commands: tuple[s
     target = (into or PACKAGE / "reports" / "recorded") / (name or study["name"])
     with whole_folder(target) as temporary:
         shutil.copyfile(folder / "results.csv", temporary / "results.csv")
-        figure = folder / "reports" / "psnr_over_ratio.png"
-        if figure.is_file():
-            shutil.copyfile(figure, temporary / figure.name)
+        for figure in (folder / "reports" / f"{name}.png" for name in FIGURES):
+            if figure.is_file():
+                shutil.copyfile(figure, temporary / figure.name)
         write_json(temporary / "about.json", about)
     click.echo(target)

@@ -32,6 +32,7 @@ rule describe:
         width=WIRING.truth_width,
         dataset=WIRING.dataset,
         room=WIRING.room,
+        walk=WIRING.walk,
     message:
         "describe {wildcards.scene}"
     shell:

@@ -1,0 +1,67 @@
+"""Differences to plain choice with rooms as the sample: what holds for a room that was not tried.
+
+A mixed model with a random effect of the room gives the same mean and, where every room has as many cells, the same
+interval: then the rooms' means are all it uses.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from . import _findings
+from ._statistics import Difference, over_samples
+from ._study import Study, in_order
+
+LEAST = 2  # rooms: fewer are no sample
+ALL = ""  # in place of a walk's name
+VERDICTS = ("better", "not told apart", "worse")  # of a scene by its seeds: wins, level, losses
+
+
+@dataclass(frozen=True)
+class OverRooms:
+    """What one selector gains over a baseline, in dB, room by room."""
+
+    rooms: dict[str, float]  # the mean over the room's scenes
+    mean: Difference  # over rooms, each counted once, with the interval that rooms give
+    counts: tuple[int, int, int]  # scenes that it wins, that the seeds cannot tell apart, that it loses
+
+    @property
+    def left_out(self) -> tuple[float, float]:
+        """The lowest and the highest mean when one room is left out."""
+        total, n = math.fsum(self.rooms.values()), len(self.rooms)
+        means = [(total - value) / (n - 1) for value in self.rooms.values()]
+        return min(means), max(means)
+
+
+def groups(study: Study) -> dict[str, dict[str, str]]:
+    """The scenes to take together, and the room of each: all, then those of each walk where there are several.
+
+    A group of scenes in a single room is left out.
+    """
+    scenes = {scene: study.scene(scene) for scene in study.scenes if any(cell.scene == scene for cell in study.done)}
+    walks = in_order(info.walk for info in scenes.values() if info.walk)
+    found = {ALL: {scene: info.room for scene, info in scenes.items()}}
+    for walk in walks if len(walks) > 1 else ():
+        found[walk] = {scene: info.room for scene, info in scenes.items() if info.walk == walk}
+    return {name: rooms for name, rooms in found.items() if len(set(rooms.values())) >= LEAST}
+
+
+def over_rooms(
+    study: Study, rooms: Mapping[str, str], backend: str, selector: str, baseline: str, ratios: Sequence[float]
+) -> OverRooms | None:
+    """The differences of mean PSNR in dB, averaged over `ratios`, then over the scenes of each room, then over rooms.
+
+    `rooms` has the room of each scene that counts. None where fewer than two rooms have both sides.
+    """
+    found: dict[str, list[float]] = {}
+    verdicts: list[str] = []
+    for scene in study.scenes:
+        if scene in rooms and (item := _findings.against(study, backend, scene, selector, baseline, tuple(ratios))):
+            found.setdefault(rooms[scene], []).append(item.mean)
+            verdicts.append(item.verdict)
+    if len(found) < LEAST:
+        return None
+    means = {room: math.fsum(values) / len(values) for room, values in found.items()}
+    counts = [sum(verdict == word for verdict in verdicts) for word in VERDICTS]
+    counts[1] = len(verdicts) - counts[0] - counts[2]  # a single sample tells nothing either
+    return OverRooms(means, over_samples(list(means.values())), (counts[0], counts[1], counts[2]))
