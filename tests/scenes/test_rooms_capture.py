@@ -272,6 +272,6 @@ def test_without_bpy_one_line_says_what_it_wants(monkeypatch):
     monkeypatch.setattr(extras, "importlib", SimpleNamespace(util=SimpleNamespace(find_spec=lambda name: None)))
     said = _rendering.available()
     assert said is not None
-    assert "pip install 'viewbench[rooms]'" in said
+    assert "pip install 'viewbench[render]'" in said
     assert "environment of its own" in said
     assert "\n" not in said

@@ -43,6 +43,9 @@ def _shard(_: click.Context, __: click.Parameter, text: str) -> tuple[int, int]:
     show_default=True,
     help="Samples a pixel before denoising; test frames have four times as many.",
 )
+@click.option(
+    "--quality", type=click.IntRange(1, 100), default=95, show_default=True, help="Of the training frames' JPEG, 4:4:4."
+)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder to write; a run that was stopped goes on in it.")
 @click.option("--shard", default="1/1", metavar="I/N", callback=_shard, help="Only every N-th frame from the I-th.")
 @click.option(
@@ -104,7 +107,7 @@ def _job(name: str, room: "Room", path: str, frames: int, given: dict[str, Any])
     if path in room.paths:
         walk = room.paths[path](frames)
         split = "test" if path == "test" else "train"
-        return Job(name, path, walk.times, walk.c2w, given["size"], given["samples"], split)
+        return Job(name, path, walk.times, walk.c2w, given["size"], given["samples"], split, given["quality"])
     file = Path(path)
     if not file.is_file():
         raise UserError(f"--path '{path}' is neither a path of {name} ({', '.join(room.paths)}) nor a file")
@@ -113,7 +116,7 @@ def _job(name: str, room: "Room", path: str, frames: int, given: dict[str, Any])
     fit = fitted(file, room, frames)
     for note in fit.notes:
         click.echo(f"viewbench: {file.name}: {note}", err=True)
-    return Job(name, file.name, fit.times, fit.c2w, given["size"], given["samples"])
+    return Job(name, file.name, fit.times, fit.c2w, given["size"], given["samples"], quality=given["quality"])
 
 
 def _describe(job: "Job", room: "Room", beside: tuple[Path, ...]) -> None:

@@ -50,7 +50,7 @@ def command(context: click.Context, study: str, out: Path, jobs: int | None, opt
     extras.need(*NEEDED, use="running a study needs", extra="study")
     settings = settings_file.load()
     loaded = _study.load(study, settings)
-    name, absent = loaded.name, absence(loaded.scenes, settings)
+    name, absent = loaded.name, absence(loaded.scenes, settings, study=True)
     if absent:
         raise UserError(absent)
     out.mkdir(parents=True, exist_ok=True)

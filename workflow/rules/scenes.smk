@@ -18,6 +18,42 @@ rule study:
         "viewbench study {params.study:q} --out {output:q} 2> {log:q}"
 
 
+# Generated rooms that are not there (`render` in environment.toml), drawn by Blender in parts that share the frames. What
+# needs the scene is planned when it is there, since all of it goes by the scene's hash.
+rule render:
+    output:
+        touch(f"{RESULTS}/rendered/{{scene}}/{{piece}}"),
+    log:
+        f"{RESULTS}/logs/render/{{scene}}/{{piece}}.log",
+    priority: 80
+    params:
+        command=WIRING.render_command,
+        part=WIRING.render_part,
+    message:
+        "render {wildcards.scene}, {wildcards.piece}"
+    shell:
+        "{params.command} {params.part} > /dev/null 2> {log:q}"
+
+
+checkpoint rendered:
+    input:
+        WIRING.render_parts,
+    output:
+        f"{RESULTS}/rendered/{{scene}}.txt",
+    log:
+        f"{RESULTS}/logs/render/{{scene}}.log",
+    priority: 80
+    params:
+        command=WIRING.render_command,
+    message:
+        "all of {wildcards.scene} is rendered"
+    shell:
+        "{params.command} > {output:q} 2> {log:q}"
+
+
+WIRING.checkpoints = checkpoints
+
+
 # For the reports; no selection, model or score depends on it.
 rule describe:
     input:

@@ -1,0 +1,100 @@
+"""A study of a room that is not there: its frames are drawn first, once, and again where some went."""
+
+import os
+import shutil
+import sys
+
+import pytest
+
+from tests.workflow.clones import Clone
+
+STUDY = """
+title: A room that is drawn first
+scenes: [drawn]
+selectors: [uniform]
+ratios: [0.2]
+seeds: 1
+backends: [{name: splat, options: {points: scene}}]
+width: 16
+budget: {iterations: 2}
+reference: false
+reports: [table_psnr, scenes]
+"""
+ENVIRONMENT = """
+[scenes.drawn]
+path = "drawn"
+room = "kitchen_living"
+render = "kitchen_living --path smooth --size 16 --frames 12"
+
+[rooms]
+python = {python!r}
+shards = 2
+
+[tracking]
+uri = ""
+"""
+# In place of a Python with Blender: `python -m viewbench ARGUMENTS` with pictures of noise.
+STAND_IN = """#!{python}
+import sys
+import numpy as np
+from viewbench.scenes.rooms import _points, _rendering, _visibility
+from viewbench.workflow.commands import _main
+
+class Renderer:
+    def __init__(self, room, size, threads=1):
+        self.size = size
+    def __enter__(self):
+        return self
+    def __exit__(self, *error):
+        pass
+    def render(self, c2w, samples, seed):
+        return np.random.default_rng(seed).integers(0, 256, (self.size, self.size, 3), dtype=np.uint8)
+
+_rendering.available = lambda: None
+_rendering.Renderer = Renderer
+_points.seen = lambda room: (np.random.default_rng(0).uniform(0, 3, (50, 3)), np.zeros((50, 3), np.uint8))
+_visibility.seen_shares = lambda room, test, train: np.full(len(test), 0.9)
+assert sys.argv[1:3] == ["-m", "viewbench"], sys.argv
+sys.exit(_main.run(sys.argv[3:]))
+"""
+
+
+@pytest.fixture
+def clone(tmp_path):
+    made = Clone(tmp_path, STUDY)
+    python = tmp_path / "python with bpy"
+    python.write_text(STAND_IN.format(python=sys.executable), encoding="utf-8")
+    python.chmod(0o755)
+    (made.folder / "environment.toml").write_text(ENVIRONMENT.format(python=str(python)), encoding="utf-8")
+    return made
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in is a script with a #! line")
+def test_a_scene_that_is_not_there_is_drawn_and_then_chosen_from(clone, tmp_path):
+    data = {"VIEWBENCH_DATA": str(tmp_path / "data")}
+    clone.run(**data)
+    scene = tmp_path / "data" / "drawn"
+    assert len(list((scene / "train").iterdir())) == 12
+    assert "90.0 %" in (clone.results / "reports" / "table_scenes.md").read_text()
+    assert clone.planned(**data) == {}
+    before = {file: file.stat().st_mtime_ns for file in (scene / "train").iterdir()}
+    score = (clone.results / "results.csv").read_bytes()
+    gone = scene / "train" / "0007.jpg"
+    for file in (gone, scene / "transforms_train.json"):
+        file.unlink()
+    clone.run(**data)
+    assert {file for file in before if file.stat().st_mtime_ns != before[file]} == {gone}, "the others were kept"
+    assert (clone.results / "results.csv").read_bytes() == score, "the same frame, so nothing was trained again"
+    assert clone.planned(**data) == {}
+
+
+def test_without_a_python_to_draw_with_one_line_says_what_brings_the_scene(clone, tmp_path):
+    clone.edit("environment.toml", f"python = {str(tmp_path / 'python with bpy')!r}", 'python = ""')
+    shutil.rmtree(tmp_path / "data", ignore_errors=True)
+    done = clone.snakemake(VIEWBENCH_DATA=str(tmp_path / "data"))
+    assert done.returncode != 0
+    said = done.stdout + done.stderr
+    assert "rendered rooms are not there (drawn)" in said
+    assert "viewbench[rooms]" in said
+    assert "VIEWBENCH_ROOMS_PYTHON" in said
+    assert "Traceback" not in said
