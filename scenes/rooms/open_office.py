@@ -9,7 +9,7 @@ from ._office_paths import HUMAN, HUMAN_START, SMOOTH, TEST, TEST_START
 from ._paths import at_rate, constant_speed, frames, steered
 from ._types import Room
 
-LOOK_S = 1.0  # how slowly the hand turns
+LOOK_S = 1.2  # how slowly the hand turns
 
 
 def build() -> Room:
