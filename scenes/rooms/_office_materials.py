@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from . import _office_pictures, _office_textures, _surfaces
+from . import _office_pictures, _office_screens, _office_textures, _surfaces
 from ._materials import MATERIALS, textures
 from ._office_textures import tweed
 from ._types import VERTEX_COLOUR, Material
@@ -25,7 +25,7 @@ OFFICE_TEXTURES: dict[str, Callable[[], np.ndarray]] = {
     "oak": lambda: _surfaces.wood(286, "a98255", "e6cb9e"),
     "birch": lambda: _surfaces.wood(287, "c2a77f", "efe0c4"),
     "smoked": lambda: _surfaces.wood(288, "33302d", "7a6d60"),
-    "screens": _office_pictures.screens,
+    "screens": _office_screens.screens,
     "papers": _office_pictures.papers,
     "posters": _office_pictures.posters,
     "binders": _office_pictures.binders,

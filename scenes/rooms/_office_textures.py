@@ -54,10 +54,12 @@ def mineral() -> np.ndarray:
         px, py, r = random.integers(0, SIZE), random.integers(0, SIZE), random.integers(1, 3)
         draw.ellipse(whole((px, py, px + r, py + r)), fill=whole(random.integers(70, 150, 1).repeat(3)))
     image = np.asarray(canvas) / 255
-    tone = random.uniform(0.7, 1.04, (4, 4)).repeat(side, 0).repeat(side, 1)
+    tints = [colour(text) * 1.02 for text in ("ffffff", "f4f6f7", "d4dee2", "bccdd4", "e6d8bf")]
+    tone = np.array(tints)[random.integers(0, 5, (4, 4))] * random.uniform(0.84, 1.0, (4, 4, 1))
+    tone = tone.repeat(side, 0).repeat(side, 1)
     y, x = np.mgrid[0:SIZE, 0:SIZE] % side
     rail = (x < 10) | (y < 10)
-    image = np.where(rail[..., None], colour("dfe3e6"), image * tone[..., None])
+    image = np.where(rail[..., None], colour("dfe3e6"), image * tone)
     image[((x >= 10) & (x < 14)) | ((y >= 10) & (y < 14)) | (x > side - 4) | (y > side - 4)] *= 0.45
     return byte_image(image)
 
