@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from . import _office_pictures, _office_screens, _office_textures, _surfaces
+from . import _office_city, _office_pictures, _office_screens, _office_textures
 from ._materials import MATERIALS, textures
-from ._office_textures import tweed
+from ._office_textures import boards, tweed
 from ._types import VERTEX_COLOUR, Material
 
 OFFICE_TEXTURES: dict[str, Callable[[], np.ndarray]] = {
@@ -21,10 +21,10 @@ OFFICE_TEXTURES: dict[str, Callable[[], np.ndarray]] = {
     "tweed_gold": lambda: tweed(284, "8a6420", "e2b650"),
     "kelim": _office_textures.kelim,
     "zinc": _office_textures.zinc,
-    "city": _office_textures.city,
-    "oak": lambda: _surfaces.wood(286, "a98255", "e6cb9e"),
-    "birch": lambda: _surfaces.wood(287, "c2a77f", "efe0c4"),
-    "smoked": lambda: _surfaces.wood(288, "33302d", "7a6d60"),
+    "city": _office_city.city,
+    "oak": lambda: boards(286, "a98255", "e6cb9e"),
+    "birch": lambda: boards(290, "c2a77f", "efe0c4"),
+    "smoked": lambda: boards(294, "33302d", "7a6d60"),
     "screens": _office_screens.screens,
     "papers": _office_pictures.papers,
     "posters": _office_pictures.posters,
@@ -42,8 +42,9 @@ OFFICE_MATERIALS = {
     "birch": Material("glossy", "birch", 0.35),
     "whiteboard": Material("glossy", "whiteboard", 0.2),
     "zinc": Material("metal", "zinc", 0.3),
+    "radiator": Material("glossy", "zinc", 0.3),
     "black": Material("glossy", VERTEX_COLOUR, 0.3),
-    "city": Material("light", "city", strength=1.3),
+    "city": Material("light", "city", strength=1.2),
     "screens": Material("light", "screens", strength=0.75),
     "prism": Material("light", "prism", strength=0.98),
 }

@@ -27,7 +27,7 @@ LAMPS = (
     (9.6, 2.0),
     (7.8, 3.8),
 )
-DAYLIGHT, LAMPLIGHT = 26.0, 13.0  # watts of a window and of a lamp
+DAYLIGHT, LAMPLIGHT = 28.0, 14.5  # watts of a window and of a lamp
 
 
 def add(room: Builder, random: np.random.Generator) -> None:
@@ -107,8 +107,8 @@ def _window(room: Builder, k: int, x0: float, x1: float, random: np.random.Gener
     room.box("oak", (x0, Y - 0.22, SILL - 0.04), (x1, Y + 0.1, SILL), repeat=0.8)
     for n in range(int((x1 - x0 - 0.2) / 0.075)):
         x = x0 + 0.1 + 0.075 * n
-        room.box("zinc", (x, Y - 0.12, 0.12), (x + 0.055, Y - 0.03, 0.7), repeat=0.3)
-    room.box("zinc", (x0 + 0.1, Y - 0.09, 0.15), (x1 - 0.1, Y, 0.2), repeat=0.3)
+        room.box("radiator", (x, Y - 0.12, 0.12), (x + 0.055, Y - 0.03, 0.7), repeat=0.3)
+    room.box("radiator", (x0 + 0.1, Y - 0.09, 0.15), (x1 - 0.1, Y, 0.2), repeat=0.3)
     sprig(room, (x0 + 0.25 + 0.1 * (k % 3), Y - 0.11, SILL), 0.065 + 0.01 * (k % 2), 22, random)
     room.lathe("glaze", CUP, (x0 + 0.75, Y - 0.12, SILL), 24, TONES[k % 6])
     for n in range(4 + k % 3):
