@@ -31,7 +31,7 @@ def build() -> Room:
         inside=((0.0, 0.0, 0.0), (_office_shell.X, _office_shell.Y, _office_shell.Z)),
         paths={
             "human": lambda count: frames(human, 10, count),
-            "smooth": lambda count: constant_speed(SMOOTH, count),
+            "smooth": lambda count: constant_speed(SMOOTH, count, 4.0),
             "test": lambda count: frames(test, 1, count),
         },
         points_path=at_rate(human, 10),
