@@ -13,7 +13,7 @@ from PIL import Image
 
 from ...common.errors import UserError
 from ...common.files import read_json, whole, write_json
-from . import _points
+from . import _points, _visibility
 from ._rendering import FIELD_OF_VIEW
 from ._types import Room
 
@@ -109,13 +109,15 @@ def write(
     room: Room,
     renderer: Callable[[], AbstractContextManager[Renderer]],
     points: Callable[[Room], tuple[np.ndarray, np.ndarray]],
+    shares: Callable[[Room, np.ndarray, np.ndarray], np.ndarray],
     shard: tuple[int, int],
     progress: Callable[[int, int | None, str], None],
 ) -> int:
     """Renders this shard's frames that are not there yet, and returns how many of all frames are still missing.
 
     `shard` (i, n) is every n-th frame from the i-th, counted from 1. When none is missing the transforms are written,
-    so a folder with them is complete. Raises UserError as `check_folder` does.
+    so a folder with them is complete; when both splits are, what `shares` finds of the test views goes beside them.
+    Raises UserError as `check_folder` does.
     """
     check_folder(out, job, room)
     folder = out / job.split
@@ -138,7 +140,24 @@ def write(
         for left in folder.glob(".part-*"):  # by runs that were killed
             left.unlink(missing_ok=True)
         write_json(out / f"transforms_{job.split}.json", job.transforms())
+        _write_seen(out, room, shares)
     return missing
+
+
+def _write_seen(out: Path, room: Room, shares: Callable[[Room, np.ndarray, np.ndarray], np.ndarray]) -> None:
+    """Of each test view the share of its pixels that some training view sees, once both are there."""
+    files = [out / f"transforms_{split}.json" for split in ("test", "train")]
+    if (out / _visibility.FILE).is_file() or not all(file.is_file() for file in files):
+        return
+    test, train = ([(frame["file_path"], frame["transform_matrix"]) for frame in _frames(file)] for file in files)
+    found = shares(room, np.array([pose for _, pose in test]), np.array([pose for _, pose in train]))
+    write_json(out / _visibility.FILE, _visibility.record([name for name, _ in test], found))
+
+
+def _frames(file: Path) -> list[dict[str, Any]]:
+    record = read_json(file, "transforms")
+    assert isinstance(record, dict)
+    return record["frames"]
 
 
 def _render(renderer: Renderer, job: Job, i: int, file: Path) -> None:

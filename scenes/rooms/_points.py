@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from ...common.files import whole
-from ._rendering import FIELD_OF_VIEW
+from ..types import OPENCV
+from ._tracing import Tracer, grid
 from ._types import VERTEX_COLOUR, Mesh, Room
 
 COUNT = 20_000  # of points, at most
@@ -18,39 +19,14 @@ NAMES = ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue")
 
 def seen(room: Room) -> tuple[np.ndarray, np.ndarray]:
     """(P, 3) float64 points and (P, 3) uint8 colours, at most COUNT, in a fixed random order."""
-    import bpy  # noqa: F401  # pyright: ignore[reportMissingImports]: an extra, which brings mathutils
-    from mathutils import Vector  # pyright: ignore[reportMissingImports]
-    from mathutils.bvhtree import BVHTree  # pyright: ignore[reportMissingImports]
-
-    names, meshes = list(room.meshes), list(room.meshes.values())
-    first = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
-    vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    triangles = np.concatenate([mesh.triangles + at for mesh, at in zip(meshes, first, strict=False)])
-    owner = np.concatenate([np.full(len(mesh.triangles), i) for i, mesh in enumerate(meshes)])
-    tree = BVHTree.FromPolygons(vertices.tolist(), triangles.tolist(), all_triangles=True)
-    uv = np.concatenate([mesh.uv for mesh in meshes])
-    colours = np.concatenate([mesh.colours for mesh in meshes])
-    all_of_it = Mesh(vertices, triangles, uv, uv, colours)
-    rays = _rays()
-    length = np.linalg.norm(rays, axis=1)
+    tracer, rays = Tracer(room), grid(RAYS)
     points, shades = [], []
-    for pose in room.points_path.c2w[::EVERY] @ np.diag([1.0, -1.0, -1.0, 1.0]):
-        origin, ways = Vector(pose[:3, 3]), (rays / length[:, None]) @ pose[:3, :3].T
-        hits = [tree.ray_cast(origin, Vector(way)) for way in ways]
-        met = np.array([hit[2] is not None for hit in hits])
-        depth = np.array([np.nan if hit[3] is None else hit[3] for hit in hits]) / length
-        place = ((rays * depth[:, None]) @ pose[:3, :3].T + pose[:3, 3])[met]
-        triangle = np.array([hit[2] for hit in hits if hit[2] is not None], dtype=np.int64)
-        points.append(place)
-        shades.append(_colours(room, names, all_of_it, owner[triangle], triangles[triangle], place))
+    for pose in room.points_path.c2w[::EVERY] @ OPENCV:
+        _, places, triangle = tracer.first_hits(pose, rays)
+        points.append(places)
+        corners = tracer.mesh.triangles[triangle]
+        shades.append(_colours(room, tracer.names, tracer.mesh, tracer.owner[triangle], corners, places))
     return _thinned(np.concatenate(points), np.concatenate(shades))
-
-
-def _rays() -> np.ndarray:
-    """(RAYS², 3) through the middles of RAYS² squares of the picture, OpenCV axes, z = 1."""
-    wide = np.tan(FIELD_OF_VIEW / 2)
-    y, x = (np.mgrid[0:RAYS, 0:RAYS] + 0.5) / RAYS * 2 - 1
-    return np.stack([x * wide, y * wide, np.ones_like(x)], -1).reshape(-1, 3)
 
 
 def _colours(

@@ -15,7 +15,7 @@ from viewbench.common import extras, plugins
 from viewbench.common.errors import UserError
 from viewbench.common.settings import PACKAGE
 from viewbench.scenes.formats import transforms
-from viewbench.scenes.rooms import _capture, _fitting, _pace, _points, _rendering
+from viewbench.scenes.rooms import _capture, _fitting, _pace, _points, _rendering, _visibility
 from viewbench.scenes.rooms._clearance import CLEARANCE_M, clearance
 from viewbench.scenes.types import OPENCV
 
@@ -41,6 +41,10 @@ def points(room: object) -> tuple[np.ndarray, np.ndarray]:
     return np.arange(6.0).reshape(2, 3), np.array([[1, 2, 3], [4, 5, 6]], np.uint8)
 
 
+def shares(room: object, test: np.ndarray, train: np.ndarray) -> np.ndarray:
+    return np.linspace(0.5, 1, len(test)) * (len(train) / 10)
+
+
 def job(path: str = "human", count: int = 6, **other: object) -> _capture.Job:
     walk = ROOM.paths[path](count)
     given: dict = {"room": "kitchen_living", "path": path, "times": walk.times, "c2w": walk.c2w, **LOOK}
@@ -56,7 +60,9 @@ def run(out: Path, made: _capture.Job, shard: tuple[int, int] = (1, 1), stop_at:
     """Renders, and returns the seeds of the frames rendered."""
     renderer = StandIn(made.size, stop_at)
     with contextlib.suppress(KeyboardInterrupt):
-        _capture.write(out, made, ROOM, lambda: contextlib.nullcontext(renderer), points, shard, lambda *_: None)
+        _capture.write(
+            out, made, ROOM, lambda: contextlib.nullcontext(renderer), points, shares, shard, lambda *_: None
+        )
     return renderer.calls
 
 
@@ -67,6 +73,8 @@ def content(out: Path) -> dict[str, bytes]:
 def test_the_stand_in_has_the_real_ones_signature():
     assert inspect.signature(StandIn.render) == inspect.signature(_rendering.Renderer.render)
     assert inspect.signature(points).return_annotation == inspect.signature(_points.seen).return_annotation
+    asked = list(inspect.signature(_visibility.seen_shares).parameters)
+    assert asked[:3] == list(inspect.signature(shares).parameters)
 
 
 def test_a_capture_is_in_the_form_of_the_shipped_one(tmp_path):
@@ -79,6 +87,8 @@ def test_a_capture_is_in_the_form_of_the_shipped_one(tmp_path):
         assert ours["camera_angle_x"] == theirs["camera_angle_x"]
         assert ours["fl_x"] == pytest.approx(theirs["fl_x"] * 16 / 256)
         assert ours["frames"][0] == theirs["frames"][0]
+    seen = json.loads((tmp_path / "seen_test.json").read_text())["seen"]
+    assert seen == {"test/0000.png": 0.3, "test/0001.png": 0.45, "test/0002.png": 0.6}
     scene = transforms.read(tmp_path)
     assert (len(scene.train), len(scene.test)) == (6, 3)
     assert scene.points is not None

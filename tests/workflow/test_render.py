@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from viewbench.common.files import sha256_folder
-from viewbench.scenes.rooms import _points, _rendering
+from viewbench.scenes.rooms import _points, _rendering, _visibility
 from viewbench.workflow.commands import _main
 
 ROOM = "kitchen_living"
@@ -46,6 +46,7 @@ def stand_in(monkeypatch):
     monkeypatch.setattr(_rendering, "available", lambda: None)
     monkeypatch.setattr(_rendering, "Renderer", Renderer)
     monkeypatch.setattr(_points, "seen", lambda room: (np.zeros((1, 3)), np.zeros((1, 3), np.uint8)))
+    monkeypatch.setattr(_visibility, "seen_shares", lambda room, test, train: np.linspace(0.5, 1, len(test)))
     return asked
 
 
@@ -67,6 +68,17 @@ def test_a_shard_says_what_is_missing(capsys, tmp_path, stand_in):
     assert "viewbench: 3 frames are other shards'" in err
     assert run(capsys, *arguments, "1/2")[1].startswith("5 of 5")
     assert len(json.loads((tmp_path / "out" / "transforms_train.json").read_text())["frames"]) == 5
+
+
+def test_what_training_views_see_of_the_test_views_is_printed(capsys, stand_in):
+    status, out, err = run(capsys, ROOM, "--path", "test", "--frames", 6, "--dry-run")
+    assert status == 0, err
+    least = "0.50 (0), 0.60 (1), 0.70 (2), 0.80 (3), 0.90 (4)"
+    assert [line for line in out.splitlines() if " sees " in line] == [
+        f"{path} sees 0.750 of the test views' pixels in the mean; least (view): {least}"
+        for path in ("human", "smooth")
+    ]
+    assert " sees " not in run(capsys, ROOM, "--frames", 6, "--dry-run")[1]
 
 
 def test_how_a_path_moves_is_printed_beside_others(capsys, tmp_path):

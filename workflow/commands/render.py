@@ -76,7 +76,7 @@ def command(room: str, path: str, frames: int | None, **given: Any) -> None:
     if given["dry_run"]:
         _describe(job, made, given["beside"])
         return
-    from ...scenes.rooms import _capture, _points, _rendering
+    from ...scenes.rooms import _capture, _points, _rendering, _visibility
 
     _capture.check_folder(given["out"], job, made)
     reason = _rendering.available()
@@ -88,6 +88,7 @@ def command(room: str, path: str, frames: int | None, **given: Any) -> None:
         made,
         lambda: _rendering.Renderer(made, job.size, given["jobs"]),
         _points.seen,
+        _visibility.seen_shares,
         given["shard"],
         _options.progress("frames"),
     )
@@ -132,3 +133,24 @@ def _describe(job: "Job", room: "Room", beside: tuple[Path, ...]) -> None:
     click.echo(f"{job.path}: {len(job.times)} frames, {least:.2f} m from everything at the nearest")
     for line in table(paths):
         click.echo(line)
+    if job.split == "test":
+        _describe_seen(job, room)
+
+
+def _describe_seen(job: "Job", room: "Room") -> None:
+    """Prints how much of the test views the room's training paths see."""
+    import numpy as np
+
+    from ...scenes.rooms import _rendering, _visibility
+
+    reason = _rendering.available()
+    if reason:
+        click.echo(f"viewbench: what training views see of the test views is not known: {reason}", err=True)
+        return
+    for name, path in room.paths.items():
+        if name == "test":
+            continue
+        shares = _visibility.seen_shares(room, job.c2w, path(FRAMES.get(name, 400)).c2w)
+        order = np.argsort(shares, kind="stable")[:5]
+        worst = ", ".join(f"{shares[i]:.2f} ({i})" for i in order)
+        click.echo(f"{name} sees {shares.mean():.3f} of the test views' pixels in the mean; least (view): {worst}")
