@@ -51,13 +51,13 @@ def _on_desk(room: Builder, random: np.random.Generator) -> None:
     pillow(room, "walnut", (3.0, 2.93, TOP + 0.015), (0.05, 0, 0), (0, 0.03, 0), (0, 0, 0.018), 1)
     room.sheet("kilim", (2.9, 2.82, TOP + 0.003), (0.2, 0, 0), (0, 0.17, 0), (0.1, 0.4, 0.4, 0.1))
     for k in range(9):
-        y = (3.52, 3.6, 3.68, 2.56, 2.6, 2.66)[k % 6]
-        angle = np.pi / 2 + random.uniform(-0.5, 0.5)
-        paper(room, (4 * k + 2 * (k // 4)) % 16, (3.02 + 0.02 * k, y, TOP + 0.004 + 0.004 * k), 0.15, angle)
+        y = (3.64, 3.7, 3.8, 2.66, 2.72, 2.78)[k % 6]
+        angle = -np.pi / 2 + random.uniform(-0.5, 0.5)
+        paper(room, (4 * k + 2 * (k // 4)) % 16, (2.82 + 0.02 * k, y, TOP + 0.004 + 0.004 * k), 0.15, angle)
     for k in range(8):
         y, high = 3.72 + 0.032 * k, random.uniform(0.17, 0.26)
         room.box("volumes", (3.19, y, TOP), (3.36, y + 0.03, TOP + high), uv=spine(k % 4, int(random.integers(0, 32))))
-    for x, y, r, high in ((2.86, 3.6, 0.04, 0.09), (3.3, 2.72, 0.045, 0.1)):
+    for x, y, r, high in ((3.12, 3.62, 0.04, 0.09), (3.3, 2.72, 0.045, 0.1)):
         mug = [(1e-3, 0), (r, 0), (r, high), (r * 0.88, high), (r * 0.85, 0.01), (1e-3, 0.01)]
         room.lathe("glaze", mug, (x, y, TOP), 24, WARM[int(20 * r)])
     for k in range(5):

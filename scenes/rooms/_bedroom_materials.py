@@ -13,11 +13,11 @@ from ._types import Material
 
 TEXTURES: dict[str, Callable[[], np.ndarray]] = {
     "herringbone": made.herringbone,
-    "pine": lambda: made.boards(350, "a8672c", "f0c684", 8, 26),
+    "pine": lambda: made.boards(350, "9c5f28", "e2b874", 8, 26),
     "whitewash": lambda: made.boards(355, "b8a68a", "f6efe0", 8, 20, 0.3),
     "sage": lambda: made.boards(360, "6d6f42", "a9a772", 8, 14, 0.35),
     "logs": lambda: made.boards(365, "6e3f1d", "c98f4e", 6, 22, 0.25),
-    "birch": lambda: wood(370, "b98a52", "f0d8a6"),
+    "birch": lambda: wood(370, "a3743e", "dfc08a"),
     "walnut": lambda: wood(371, "3a2114", "8a5630"),
     "blossom": made.blossom,
     "patchwork": made.patchwork,
@@ -42,7 +42,7 @@ TEXTURES: dict[str, Callable[[], np.ndarray]] = {
     "fells": faces.fells,
 }
 GLOSSY = {"herringbone": 0.3, "walnut": 0.25, "guitar": 0.1, "globe": 0.15}
-LIGHTS = {"lantern": 0.95, "screen": 0.75, "fells": 0.95}
+LIGHTS = {"lantern": 1.15, "screen": 0.8, "fells": 1.15}
 
 
 def _material(name: str) -> Material:
