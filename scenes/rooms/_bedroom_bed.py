@@ -75,7 +75,8 @@ def _bookcase(room: Builder, random: np.random.Generator) -> None:
         room.box("birch", (0.022, y - 0.012, 0), (0.31, y + 0.012, 1.3))
     room.sheet("walnut", (0.024, y0, 0), (0, y1 - y0, 0), (0, 0, 1.3), repeat=0.5)
     for z in (0.06, 0.37, 0.68, 0.99, 1.3):
-        room.box("birch", (0.022, y0 - 0.012, z), (0.32, y1 + 0.012, z + 0.025))
+        over = 0.03 if z == 1.3 else -0.012
+        room.box("birch", (0.022, y0 - over, z), (0.305 + max(over, 0), y1 + over, z + 0.025))
         for half in (0, 1) if z < 1.2 else ():
             _row(room, y0 + 0.66 * half + 0.02, y0 + 0.66 * (half + 1) - 0.02, z + 0.025, random)
     room.cylinder("walnut", (0.19, 0.55, 1.325), 0.07, 0.03)

@@ -1,8 +1,9 @@
-"""Textures of single things in the bedroom: screen, keys, painted wood, guitar, globe, clock, and the view outside."""
+"""Textures of single things in the bedroom: books, basket, lantern, screen, painted wood, guitar, globe, the view."""
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from . import _pictures
 from ._noise import byte_image, colour, hsv, mix, noise, whole
 
 
@@ -105,7 +106,7 @@ def clock() -> np.ndarray:
     draw.ellipse((6, 6, 250, 250), outline=(110, 44, 30), width=8)
     for k in range(12):
         x, y = 128 + 92 * np.sin(k * np.pi / 6), 128 - 92 * np.cos(k * np.pi / 6)
-        draw.text(whole((x - 10, y - 20)), str(k or 12), font=font, fill=(60, 30, 24))
+        draw.text((int(x - 10), int(y - 20)), str(k or 12), font=font, fill=(60, 30, 24))
     draw.line((128, 128, 176, 74), fill=(50, 26, 22), width=9)
     draw.line((128, 128, 62, 128), fill=(176, 60, 36), width=6)
     return np.asarray(canvas)
@@ -141,3 +142,26 @@ def fells() -> np.ndarray:
         cx, cy = random.integers(0, wide), random.integers(462, high)
         draw.line(whole((cx, cy, cx + random.integers(-4, 5), cy - 12)), fill=hsv(random.uniform(0.1, 0.25), 0.5, 0.7))
     return np.asarray(canvas)
+
+
+def wicker() -> np.ndarray:
+    """Woven willow."""
+    y, x = np.mgrid[0:512, 0:512]
+    bulge = np.abs(np.sin(x / 512 * 24 * np.pi + np.pi / 2 * (y // 22 % 2))) * np.abs(np.sin(y / 22 * np.pi)) ** 0.5
+    image = mix(colour("4a2c14"), colour("c99458"), bulge)
+    return byte_image(image * (0.75 + 0.5 * noise(512, 512, 343, 5, 16, 0.8))[..., None])
+
+
+def lantern() -> np.ndarray:
+    """Paper over ribs, with leaves pressed into it."""
+    y = np.mgrid[0:512, 0:512][0]
+    image = mix(colour("d99e58"), colour("ffe7b8"), np.abs(np.sin(y / 512 * 14 * np.pi)) ** 0.5)
+    image[np.abs(noise(512, 512, 344, 4, 5) - 0.52) < 0.02] *= 0.62
+    return byte_image(image * (0.75 + 0.3 * noise(512, 512, 345, 4, 12))[..., None])
+
+
+def volumes() -> np.ndarray:
+    """Spines of old books: those that rooms share, faded and browned."""
+    image = _pictures.books() / 255.0
+    faded = 0.6 * image + 0.4 * image.mean(axis=2, keepdims=True)
+    return byte_image(faded * np.array([1.1, 0.92, 0.7]) + 0.07)

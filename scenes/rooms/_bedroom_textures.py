@@ -1,9 +1,8 @@
-"""Textures of the bedroom's surfaces and cloth: parquet, boards, wallpaper, quilt, knitting, carpet, paper."""
+"""Textures of the bedroom's surfaces and cloth: parquet, boards, wallpaper, quilt, knitting, carpet, cork."""
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from . import _pictures
 from ._noise import between, byte_image, colour, mix, noise, whole
 
 SIZE = 1024
@@ -185,26 +184,3 @@ def cork() -> np.ndarray:
     image = mix(colour("8a5a30"), colour("d9a86a"), noise(512, 512, 341, 5, 24, 0.8))
     image[noise(512, 512, 342, 3, 70, 0.8) > 0.66] = colour("5a361c")
     return byte_image(image)
-
-
-def wicker() -> np.ndarray:
-    """Woven willow."""
-    y, x = np.mgrid[0:512, 0:512]
-    bulge = np.abs(np.sin(x / 512 * 24 * np.pi + np.pi / 2 * (y // 22 % 2))) * np.abs(np.sin(y / 22 * np.pi)) ** 0.5
-    image = mix(colour("4a2c14"), colour("c99458"), bulge)
-    return byte_image(image * (0.75 + 0.5 * noise(512, 512, 343, 5, 16, 0.8))[..., None])
-
-
-def lantern() -> np.ndarray:
-    """Paper over ribs, with leaves pressed into it."""
-    y = np.mgrid[0:512, 0:512][0]
-    image = mix(colour("d99e58"), colour("ffe7b8"), np.abs(np.sin(y / 512 * 14 * np.pi)) ** 0.5)
-    image[np.abs(noise(512, 512, 344, 4, 5) - 0.52) < 0.02] *= 0.62
-    return byte_image(image * (0.75 + 0.3 * noise(512, 512, 345, 4, 12))[..., None])
-
-
-def volumes() -> np.ndarray:
-    """Spines of old books: those that rooms share, faded and browned."""
-    image = _pictures.books() / 255.0
-    faded = 0.6 * image + 0.4 * image.mean(axis=2, keepdims=True)
-    return byte_image(faded * np.array([1.1, 0.92, 0.7]) + 0.04)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from . import _bedroom_bed, _bedroom_desk, _bedroom_shell
+from . import _bedroom_bed, _bedroom_clothes, _bedroom_desk, _bedroom_shell
 from ._bedroom_materials import MATERIALS, textures
 from ._bedroom_paths import HUMAN, HUMAN_START, SMOOTH, TEST, TEST_START
 from ._bedroom_shell import WINDOW, X, Y, Z
@@ -21,6 +21,7 @@ def build() -> Room:
     _bedroom_shell.add(room)
     _bedroom_bed.add(room, random)
     _bedroom_desk.add(room, random)
+    _bedroom_clothes.add(room, random)
     meshes = room.meshes()
     materials = {name: MATERIALS[name] for name in meshes}
     human = steered(HUMAN, HUMAN_START, seed=11, jitter=JITTER, look_s=LOOK_S)
@@ -47,6 +48,6 @@ def _lights() -> tuple[AreaLight, ...]:
     window = ((x0 + x1) / 2, Y - 0.035, (z0 + z1) / 2)
     return (
         AreaLight("window", window, (-math.pi / 2, 0.0, 0.0), (x1 - x0, z1 - z0), 50.0, (1.0, 0.95, 0.88)),
-        AreaLight("above", (1.85, 1.7, Z - 0.13), (0.0, 0.0, 0.0), (1.6, 3.0), 34.0, (1.0, 0.95, 0.89)),
+        AreaLight("above", (1.85, 1.7, Z - 0.13), (0.0, 0.0, 0.0), (1.6, 3.0), 37.0, (1.0, 0.95, 0.89)),
         AreaLight("below", (1.6, 1.6, 0.9), (math.pi, 0.0, 0.0), (1.2, 2.4), 11.0, (1.0, 0.94, 0.86)),
     )
