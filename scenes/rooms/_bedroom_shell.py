@@ -43,11 +43,19 @@ def _slope(room: Builder) -> None:
         start, row = 0.37 * k, (5 * k) % 8
         uv = (start, (row + 1) / 8, start + Y / 1.2, row / 8)
         room.sheet("pine", low, (0, Y, 0), high - low, uv)
-    for k, (y, up) in enumerate(((2.3, 0.14), (2.62, 0.3), (2.95, 0.12), (3.3, 0.26), (3.62, 0.1), (0.5, 0.42))):
+    cards = ((2.3, 0.14), (2.62, 0.3), (2.95, 0.12), (3.3, 0.26), (3.62, 0.1), (0.5, 0.42))
+    more = ((0.85, 0.14), (1.2, 0.32), (1.5, 0.16), (1.75, 0.44), (0.2, 0.2), (2.2, 0.55))
+    for k, (y, up) in enumerate(cards + more):
         way = on_slope(0, 1) - on_slope(0, 0)
         turn = 0.03 * np.sin(9 * k)
         u = np.array([0, 0.2, 0]) + turn * way / np.linalg.norm(way)
-        room.sheet("notes", on_slope(y, up, 0.008), u, 0.2 * way / np.linalg.norm(way), cell((2 * k + 1) % 16, 4, 4))
+        room.sheet(
+            "notes",
+            on_slope(y, up, 0.008),
+            u,
+            0.2 * way / np.linalg.norm(way),
+            cell((2 * k + 1 + 2 * (k // 8)) % 16, 4, 4),
+        )
 
 
 def _walls(room: Builder) -> None:
