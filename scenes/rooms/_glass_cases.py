@@ -81,7 +81,7 @@ def _cabinet(room: Builder, random: np.random.Generator) -> None:
         left = x0 + 0.04 + 0.45 * k
         room.box("rosewood", (left, y0 - 0.015, 0.12), (left + 0.42, y0, 0.5), repeat=0.4)
         room.sphere("gold", (left + 0.37, y0 - 0.03, 0.32), 0.018, segments=10)
-    room.box("fans_cream", (x0, y1 - 0.02, BAYS[0]), (x1, y1, BAYS[-1]), repeat=0.8)
+    room.box("fans_green", (x0, y1 - 0.02, BAYS[0]), (x1, y1, BAYS[-1]), repeat=1.4)
     for x in (x0, x1 - 0.03):
         room.box("gold", (x, y0, BAYS[0]), (x + 0.03, y0 + 0.03, BAYS[-1]))
     room.box("walnut", (x0 - 0.02, y0 - 0.02, BAYS[-1]), (x1 + 0.02, y1, BAYS[-1] + 0.09), repeat=0.6)

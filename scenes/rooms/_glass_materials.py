@@ -9,8 +9,8 @@ from ._types import Material
 
 TEXTURES: dict[str, Callable[[], np.ndarray]] = {
     "terrazzo": _glass_textures.terrazzo,
-    "fans_green": lambda: _glass_textures.fans(250, "4a8a70", "9cc3a4", "e6c470"),
-    "fans_cream": lambda: _glass_textures.fans(270, "f6ebcb", "e2c79a", "9c3a4c"),
+    "fans_green": lambda: _glass_textures.fans(250, "2f6d57", "b6d3ac", "e2bd62"),
+    "fans_cream": lambda: _glass_textures.fans(270, "f8eecf", "d4aa7c", "962f44"),
     "stucco": _glass_textures.stucco,
     "stucco_beam": _glass_textures.plaster_grain,
     "velvet_green": lambda: _glass_textures.velvet(290, "175a47", "5fb08e"),
@@ -37,7 +37,7 @@ MATERIALS = {
     "keys": Material("glossy", "keys", 0.15),
     "chess": Material("glossy", "chess", 0.1),
     "gold": Material("metal", (0.93, 0.68, 0.27), 0.12),
-    "alabaster": Material("light", "alabaster", strength=1.1),
+    "alabaster": Material("light", "alabaster", strength=0.92),
     "skyline": Material("light", "skyline", strength=1.02),
     **{
         name: Material("diffuse", name)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ._builder import Builder
-from ._furniture import FRUIT, leaves
+from ._furniture import BOOK, FRUIT, any_colour, leaves
 from ._glass_things import UPRIGHT, books, bottles, bunch, chess_game, lamp, poster, turned, vase
 
 TABLE = (1.9, 1.4, 3.1, 2.1, 0.42)  # the low table: x and y from, x and y to, height of its plate's lower side
@@ -23,6 +23,7 @@ def add(room: Builder, random: np.random.Generator) -> None:
     _pouf(room, random)
     lamp(room, (1.0, 0.4, 0), 1.75, 0.2)
     _plant(room, random)
+    _left_lying(room, random)
 
 
 def _sofa(room: Builder) -> None:
@@ -128,3 +129,32 @@ def _plant(room: Builder, random: np.random.Generator) -> None:
     pot = [(1e-3, 0), (0.13, 0), (0.18, 0.32), (0.16, 0.32), (0.15, 0.27), (1e-3, 0.27)]
     room.lathe("glaze", pot, (0.42, 0.42, 0), 32, (0.08, 0.3, 0.24))
     leaves(room, 0.42, 0.42, (0.04, 0.04, 0), (0.85, 0.92, 2.4), random)
+
+
+def _left_lying(room: Builder, random: np.random.Generator) -> None:
+    """A throw and a newspaper on the sofa, cups on the table, slippers, a tray and games on the floor."""
+    room.box("plaid", (2.98, 0.6, 0.46), (3.42, 0.975, 0.478), repeat=0.5)
+    room.box("plaid", (2.98, 0.972, 0.12), (3.42, 0.985, 0.478), repeat=0.5)
+    room.box("posters", (1.75, 0.62, 0.46), (2.0, 0.9, 0.466), uv=poster(6), angle=0.4)
+    room.box(BOOK, (2.3, 0.66, 0.46), (2.5, 0.8, 0.49), uv=(0.4, 0.24, 0.43, 0.01), angle=-0.5)
+    cup = [(1e-3, 0), (0.028, 0), (0.038, 0.06), (0.034, 0.06), (0.024, 0.008), (1e-3, 0.008)]
+    saucer = [(1e-3, 0), (0.04, 0), (0.07, 0.012), (0.068, 0.015), (0.04, 0.005), (1e-3, 0.005)]
+    top = TABLE[4] + PLATE
+    for k, (x, y) in enumerate(((2.02, 1.98), (2.42, 1.5), (2.98, 1.98))):
+        room.lathe("glaze", saucer, (x, y, top), 28, (0.7, 0.62, 0.45))
+        room.lathe("glaze", cup, (x, y, top + 0.006), 24, ((0.03, 0.25, 0.18), (0.5, 0.04, 0.1))[k % 2])
+    for x, turn in ((1.02, 0.3), (1.16, -0.1)):
+        room.box("velvet_wine", (x - 0.045, 2.55, 0), (x + 0.045, 2.8, 0.05), repeat=0.3, angle=turn)
+    for k in range(12):
+        x, y = random.uniform(3.75, 4.15), random.uniform(1.1, 1.75)
+        r = random.uniform(0.025, 0.045)
+        if k % 2:
+            uv = (k % 4 / 4, 0.5, k % 4 / 4 + 0.25, 0)
+            room.box("letters", (x, y, 0.0), (x + 2 * r, y + 2 * r, 2 * r), uv=uv, angle=random.uniform(0, 3))
+        else:
+            room.sphere("glaze", (x, y, r), r, any_colour(random), 12)
+    for k in range(3):
+        low = (0.5 + 0.02 * k, 3.42 + 0.28 * k, 0)
+        room.box(
+            "posters", low, (low[0] + 0.3, low[1] + 0.3, 0.004 + 0.003 * k), uv=poster(k * 2 + 1), angle=0.4 * k - 0.3
+        )

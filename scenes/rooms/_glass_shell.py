@@ -11,6 +11,7 @@ WINDOW = (0.6, 4.6, 0.56, 2.4)  # lowest and highest y, lowest and highest z, in
 COFFERS = 4  # each way
 OUTSIDE_M = 0.9  # from the window to the picture behind it
 RAIL = 0.8  # height of the panelling
+PAPER_M = 2.1  # width of the wallpaper's pattern
 
 
 def add(room: Builder, random: np.random.Generator) -> None:
@@ -29,11 +30,11 @@ def add(room: Builder, random: np.random.Generator) -> None:
 def _walls(room: Builder) -> None:
     y0, y1, z0, z1 = WINDOW
     room.sheet("terrazzo", (0, 0, 0), (X, 0, 0), (0, Y, 0), repeat=1.8)
-    room.sheet("fans_green", (X, 0, 0), (-X, 0, 0), (0, 0, Z), repeat=1.5)
-    room.sheet("fans_green", (0, Y, 0), (X, 0, 0), (0, 0, Z), repeat=1.5)
-    room.sheet("fans_cream", (0, 0, 0), (0, Y, 0), (0, 0, Z), repeat=1.5)
+    room.sheet("fans_green", (X, 0, 0), (-X, 0, 0), (0, 0, Z), repeat=PAPER_M)
+    room.sheet("fans_green", (0, Y, 0), (X, 0, 0), (0, 0, Z), repeat=PAPER_M)
+    room.sheet("fans_cream", (0, 0, 0), (0, Y, 0), (0, 0, Z), repeat=PAPER_M)
     for low_y, high_y, low_z, high_z in ((0, y0, 0, Z), (y1, Y, 0, Z), (y0, y1, 0, z0), (y0, y1, z1, Z)):
-        uv = ((Y - high_y) / 1.5, low_z / 1.5, (Y - low_y) / 1.5, high_z / 1.5)
+        uv = ((Y - high_y) / PAPER_M, low_z / PAPER_M, (Y - low_y) / PAPER_M, high_z / PAPER_M)
         room.sheet("fans_cream", (X, high_y, low_z), (0, low_y - high_y, 0), (0, 0, high_z - low_z), uv=uv)
 
 
