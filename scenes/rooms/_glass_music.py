@@ -13,7 +13,7 @@ def records(room: Builder, random: np.random.Generator) -> None:
     for z in (0.05, 0.445, high - 0.03):
         room.box("rosewood", (0.02, y0, z), (deep, y1, z + 0.03), repeat=0.5)
     for y in np.linspace(y0, y1 - 0.03, 4):
-        room.box("rosewood", (0.02, y, 0), (deep, y + 0.03, high), repeat=0.5)
+        room.box("rosewood", (0.02, y, 0), (deep - 0.006, y + 0.03, high - 0.01), repeat=0.5)
     room.box("brocade", (0.02, y0, 0.05), (0.035, y1, high), repeat=0.6)
     for column in range(3):
         for z in (0.08, 0.475):

@@ -60,9 +60,9 @@ def _ceiling(room: Builder) -> None:
         left, right = max(x - 0.08, 0), min(x + 0.08, X)
         near, far = max(y - 0.08, 0), min(y + 0.08, Y)
         room.box("stucco_beam", (left, 0, Z - 0.12), (right, Y, Z), repeat=0.6)
-        room.box("stucco_beam", (0, near, Z - 0.121), (X, far, Z), repeat=0.6)
+        room.box("stucco_beam", (0, near, Z - 0.124), (X, far, Z), repeat=0.6)
         room.box("gold", (max(x - 0.02, 0), 0, Z - 0.13), (min(x + 0.02, X), Y, Z - 0.12))
-        room.box("gold", (0, max(y - 0.02, 0), Z - 0.131), (X, min(y + 0.02, Y), Z - 0.121))
+        room.box("gold", (0, max(y - 0.02, 0), Z - 0.134), (X, min(y + 0.02, Y), Z - 0.124))
 
 
 def _outside(room: Builder) -> None:
@@ -145,7 +145,7 @@ def _curtain(room: Builder, y0: float, y1: float) -> None:
 def _chandelier(room: Builder) -> None:
     """Three tiers of alabaster on a golden rod in the middle of the ceiling."""
     x, y = X / 2, Y / 2
-    room.cylinder("gold", (x, y, 2.3), 0.015, Z - 0.132 - 2.3)
+    room.cylinder("gold", (x, y, 2.3), 0.015, Z - 0.135 - 2.3)
     for k, (r, z) in enumerate(((0.14, 2.2), (0.24, 2.3), (0.34, 2.4))):
         room.lathe("alabaster", [(1e-3, 0), (r * 0.7, 0.0), (r, 0.07)], (x, y, z), 40)
         room.lathe("gold", [(r, 0), (r + 0.012, 0.006), (r + 0.012, 0.022), (r, 0.024)], (x, y, z + 0.07), 40)

@@ -51,8 +51,8 @@ def _lights() -> tuple[AreaLight, ...]:
     """
     y0, y1, z0, z1 = WINDOW
     sideways, up, down = (math.pi / 2, 0.0, math.pi / 2), (math.pi, 0.0, 0.0), (0.0, 0.0, 0.0)
-    window = AreaLight("window", (X - 0.04, (y0 + y1) / 2, (z0 + z1) / 2), sideways, (y1 - y0, z1 - z0), 75.0, DUSK)
-    ceiling = AreaLight("ceiling", (X / 2, Y / 2, Z - 0.14), down, (4.2, 4.0), 105.0, WARM)
+    window = AreaLight("window", (X - 0.04, (y0 + y1) / 2, (z0 + z1) / 2), sideways, (y1 - y0, z1 - z0), 88.0, DUSK)
+    ceiling = AreaLight("ceiling", (X / 2, Y / 2, Z - 0.14), down, (4.2, 4.0), 124.0, WARM)
     cove = AreaLight("cove", (X / 2, Y / 2, 2.05), up, (4.2, 4.0), 18.0, WARM)
     left, near, right, far, high = TABLE
     middle = ((left + right) / 2, (near + far) / 2, high - 0.005)
