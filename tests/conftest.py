@@ -16,6 +16,7 @@ from viewbench.common.settings import PACKAGE
 
 ROOM = PACKAGE / "scenes" / "generated_room" / "human"
 CODE = ("common", "scenes", "selectors", "backends", "reports", "workflow")
+DATA = ("generated_room", "rendered")  # folders of scenes/ that are large
 T = TypeVar("T")
 
 
@@ -102,12 +103,13 @@ def copy_package(parent: Path) -> Path:
     clone = parent / "viewbench"
     clone.mkdir(parents=True)
     for name in CODE:
-        ignored = shutil.ignore_patterns("__pycache__", "generated_room")
+        ignored = shutil.ignore_patterns("__pycache__", *DATA)
         shutil.copytree(PACKAGE / name, clone / name, ignore=ignored, symlinks=True)
     for name in ("__init__.py", "__main__.py", "Snakefile", "environment.toml"):
         shutil.copy(PACKAGE / name, clone / name)
     (clone / "profiles").symlink_to("workflow/profiles")
-    (clone / "scenes" / "generated_room").symlink_to(PACKAGE / "scenes" / "generated_room")
+    for name in DATA:
+        (clone / "scenes" / name).symlink_to(PACKAGE / "scenes" / name)
     return clone
 
 

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import zipfile
+from pathlib import Path
 
 import pytest
 
@@ -66,3 +67,41 @@ assert _main.run(["study", "quick"]) == 0
     info, _ = json.JSONDecoder().raw_decode(lines)
     assert info
     assert (tmp_path / "site" / "viewbench" / "workflow" / "Snakefile").is_file()
+
+
+def test_the_rendered_rooms_are_in_a_wheel_of_their_own(tmp_path, wheel, once):
+    """Without it the code says what brings them; with it beside the code they open by name."""
+
+    def build(folder: Path) -> None:
+        command = [
+            sys.executable,
+            "-m",
+            "build",
+            "--wheel",
+            "--outdir",
+            str(folder),
+            str(PACKAGE / "scenes" / "rendered"),
+        ]
+        subprocess.run(command, check=True, capture_output=True)
+
+    rooms = next(once("rooms", build).glob("*.whl"))
+    site = tmp_path / "site"
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(site)
+    assert not (site / "viewbench" / "scenes" / "rendered").exists()
+    code = f"""
+import sys
+sys.path.insert(0, {str(site)!r})
+from viewbench.workflow.commands import _main
+status = _main.run(["select", "office_smooth", "--count", "3", "--dry-run"])
+print(status)
+"""
+    alone = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert alone.stdout == "1\n"
+    assert "pip install 'viewbench[rooms]'" in alone.stderr
+    with zipfile.ZipFile(rooms) as archive:
+        archive.extractall(site)
+        assert any(name.endswith("LICENSE") for name in archive.namelist())
+    lines = python(code, cwd=tmp_path).splitlines()
+    assert lines[-1] == "0"
+    assert [line for line in lines if line.startswith("train/")], "views were chosen, by the features that came along"
