@@ -1,18 +1,20 @@
 """What a data set is, for its readers: a table of its captures, maps of their ways, and example views."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ..common.files import whole
 from ..scenes.images import load_images
 from ..scenes.rooms._pace import PERCENTILES, pace
 from ..scenes.types import Scene
 from . import _figures, _topview
-from ._tables import Entry, Table
+from ._tables import Entry, Table, write_csv
 
 LENGTH_S = 0.1  # between the places that a way's length is summed over, so that jitter adds nothing
 EXAMPLES = 6  # views of a capture that are shown, the last two of them test views
@@ -88,7 +90,7 @@ def maps(captures: Sequence[Capture], out: Path) -> tuple[str, ...]:
         handles = [Line2D([], [], color=CHART["train"], label="training path")]
         handles += [Line2D([], [], color=CHART["test"], marker="x", linestyle="none", label="test views")]
         figure.legend(handles=handles, loc="outside lower center", ncols=2)
-        return _figures.save(figure, out, "maps", records)
+        return _save(figure, out, "maps", records)
 
 
 def _flat(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -143,7 +145,15 @@ def views(captures: Sequence[Capture], out: Path) -> tuple[str, ...]:
                 place.spines[:].set_visible(False)
             places[0].set_ylabel(capture.name, fontsize=8)
         figure.set_layout_engine("constrained", w_pad=0.01, h_pad=0.01, wspace=0, hspace=0)
-        return _figures.save(figure, out, "views", records)
+        return _save(figure, out, "views", records)
+
+
+def _save(figure: Figure, out: Path, name: str, records: Sequence[Mapping[str, object]]) -> tuple[str, ...]:
+    """Writes name.jpg, which is small enough to lie beside a data set, and the CSV behind it."""
+    with whole(out / f"{name}.jpg") as temporary:
+        figure.savefig(temporary, format="jpg", dpi=100, pil_kwargs={"quality": 85, "optimize": True})
+    write_csv(out / f"{name}.csv", records)
+    return (f"{name}.jpg", f"{name}.csv")
 
 
 def _spread(count: int, wanted: int) -> list[int]:

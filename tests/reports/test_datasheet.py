@@ -42,7 +42,7 @@ def test_a_row_for_each_capture_with_maps_and_views(tmp_path, capsys):
     assert float(rows[0]["seconds"]) == pytest.approx(52, abs=1)
     assert rows[1]["seconds"] == "", "it has no times"
     assert rows[1]["pixels"] == "32 × 24"
-    for name in ("maps.png", "views.png"):
+    for name in ("maps.jpg", "views.jpg"):
         assert (out / name).stat().st_size > 10_000
     views = list(csv.DictReader((out / "views.csv").open()))
     assert [view["split"] for view in views if view["capture"] == "room_human"] == ["train"] * 4 + ["test"] * 2

@@ -17,7 +17,7 @@ def command(scenes: tuple[str, ...], out: Path) -> None:
     """Write a datasheet of SCENES: captures by name or folder, whose unit is taken to be the metre.
 
     captures.md, .csv and .tex have a row a capture (frames, seconds, metres walked, percentiles of speed and turn rate,
-    how much of the test views training views see), maps.png the ways from above, views.png what they see.
+    how much of the test views training views see), maps.jpg the ways from above, views.jpg what they see.
     """
     from ...common import extras
     from ...common import settings as settings_file
