@@ -1,4 +1,4 @@
-"""Renders a room with Blender's Cycles; the only module that needs bpy, besides `_points`.
+"""Renders a room with Blender's Cycles; the only module that needs bpy, besides `_tracing`.
 
 bpy 5.0 is for Python 3.11 and numpy 1.26 alone, so it wants an environment of its own. Pixels are the same in every
 process and for any number of threads; processors differ in a pixel in a thousand, by their approximate reciprocals.

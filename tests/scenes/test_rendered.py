@@ -1,5 +1,6 @@
 """The rendered rooms that ship: frames of the rooms as their code builds them, fair test views, within their size."""
 
+import io
 import json
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from viewbench.common.files import sha256_file
 from viewbench.common.settings import PACKAGE
 from viewbench.scenes import features
 from viewbench.scenes.load import open_scene
+from viewbench.scenes.rooms import _rendering
 from viewbench.scenes.rooms._capture import Job, digest
 from viewbench.scenes.rooms._pace import PERCENTILES, pace
 
@@ -102,3 +104,21 @@ def test_the_features_that_ship_are_the_encoders(name, tmp_path):
     fresh = features.features(some, "efficientnet-lite0", tmp_path / "cache")
     assert np.abs(shipped - fresh).max() < 1e-3
     assert (np.einsum("nd,nd->n", shipped, fresh) > 0.9999).all()
+
+
+@pytest.mark.skipif(_rendering.available() is not None, reason="bpy is not installed")
+def test_the_same_frames_are_drawn_again(room):
+    """Pixel for pixel on the processor that drew them; others differ in single values."""
+    name, made = room
+    record = json.loads((FOLDER / name / "smooth" / "render_train.json").read_text())
+    poses = made.paths["smooth"](record["frames"]).c2w
+    with _rendering.Renderer(made, record["size"], 2) as renderer:
+        for i in (3, 250):
+            drawn, encoded = renderer.render(poses[i], record["samples"], i), io.BytesIO()
+            Image.fromarray(drawn).save(encoded, "JPEG", quality=record["quality"], subsampling=0)
+            ours, shipped = (
+                np.asarray(Image.open(file)).astype(int)
+                for file in (encoded, FOLDER / name / "smooth" / "train" / f"{i:04d}.jpg")
+            )
+            assert np.abs(ours - shipped).mean() < 0.5
+            assert np.percentile(np.abs(ours - shipped), 99.9) <= 8
