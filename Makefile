@@ -101,7 +101,7 @@ format: dev
 	$(BIN)/snakefmt Snakefile workflow
 
 clean:
-	rm -rf $(VENV) build dist .snakemake .pytest_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf $(VENV) build dist .snakemake .pytest_cache .ruff_cache .hypothesis *.egg-info scenes/rendered/build scenes/rendered/*.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 	@test ! -e results || echo "results/ is kept; make clean-results removes it"
 

@@ -9,7 +9,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 from .errors import UserError, nearest
 
 PACKAGE = Path(__file__).resolve().parent.parent
-ROOMS_PACKAGE = "viewbench_rooms"  # the rendered rooms as a package of their own, since they are 50 MB
+ROOMS_PACKAGE = "viewbench_rooms"  # the rendered rooms as a package of their own, since they are 60 MB
 FILE = "environment.toml"
 
 

@@ -50,7 +50,8 @@ def _row(capture: Capture, known: bool) -> tuple[Entry, ...]:
     size = f"{int(train.cameras.width[0])} × {int(train.cameras.height[0])}"
     row = [Entry(capture.name), Entry(capture.room), Entry(capture.walk)]
     row += [Entry(str(len(train)), len(train)), Entry(str(len(test)), len(test)), Entry(size)]
-    if train.times is None:
+    # Of poses that mean nothing, of one frame and of times that do not rise nothing is told.
+    if train.times is None or not capture.scene.posed or len(train) < 2 or not (np.diff(train.times) > 0).all():
         row += [Entry("")] * 6
     else:
         seconds, way = float(train.times[-1] - train.times[0]), length(train.times, train.cameras.positions)
@@ -77,7 +78,13 @@ def length(times: np.ndarray, positions: np.ndarray) -> float:
 
 
 def maps(captures: Sequence[Capture], out: Path) -> tuple[str, ...]:
-    """Draws every way from above over the scene's points, a panel a capture, each with a scale of its own."""
+    """Draws every way from above over the scene's points, a panel a capture, each with a scale of its own.
+
+    Captures without poses are left out; nothing is drawn where all are.
+    """
+    captures = [capture for capture in captures if capture.scene.posed]
+    if not captures:
+        return ()
     drawn = [_flat(capture.scene) for capture in captures]
     records = []
     with _figures.look():

@@ -8,6 +8,7 @@ from typing import Any
 from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import SceneEntry, Settings
+from . import shipped_features
 from .reading import reader_of
 from .splits import hold_out
 from .types import Scene
@@ -38,7 +39,8 @@ def open_scene(
     asked = format or (entry.format if entry else "")
     chosen, options = reader_of(root, asked, entry, reading, settings, detect)
     scene = plugins.load(FORMATS, chosen).read(root, **options)
-    scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name)
+    files = (*scene.files, *shipped_features.files(root))  # a choice is made by them
+    scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name, files=files)
     scene = _held_out(scene, holdout or "", entry.holdout if entry else "", settings)
     check_scene(scene)
     return scene
@@ -83,9 +85,11 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
             f"no folder and no scene of {settings.source} is called '{name}'{hint} (scenes: {', '.join(known)})"
         )
     folder = settings.folder_of(entry)
-    if folder is None or not folder.exists():
-        from .whereabouts import absence  # no source: it says what is missing
+    if folder is None or not folder.exists() or entry.render:
+        from .whereabouts import absence, renderable  # no source: it says what is missing
 
+        if folder is not None and folder.exists() and not renderable([name], settings):
+            return folder
         raise UserError(absence([name], settings) or f"scene '{name}' is not in '{folder}'")
     return folder
 

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from ..common.errors import UserError
-from ..common.files import read_json, whole, write_json
+from ..common.files import read_json, sha256_file, whole, write_json, write_text
 
-FOLDER = "features"  # of a capture; NAME.npy has the rows, NAME.json says of which pictures and by what
+# Of a capture: NAME.npy has the rows, NAME.json says of which pictures and by what, NAME.sha256 ties them together, as
+# `sha256sum -c` reads it.
+FOLDER = "features"
 
 
 def files(root: Path) -> tuple[Path, ...]:
@@ -27,6 +29,7 @@ def write(root: Path, encoder: str, made_by: dict[str, Any], pictures: Sequence[
     with whole(file) as temporary, open(temporary, "wb") as opened:
         np.save(opened, rows.astype(np.float16))
     write_json(file.with_suffix(".json"), {"schema": 1, "encoder": encoder, **made_by, "pictures": list(pictures)})
+    write_text(file.with_suffix(".sha256"), _sums(file))  # last: what a stopped run leaves is not taken
     return file
 
 
@@ -42,15 +45,22 @@ def read(root: Path, encoder: str, made_by: dict[str, Any]) -> dict[str, np.ndar
     record = read_json(file.with_suffix(".json"), "features")
     if any(record.get(key) != value for key, value in made_by.items()):
         return {}
+    mend = "delete that folder, or bring it anew"
     try:
-        rows = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise UserError(f"features '{file}' cannot be read: {error}; delete the folder, or bring it anew") from None
+        if file.with_suffix(".sha256").read_text(encoding="utf-8") != _sums(file):
+            raise UserError(f"features '{file}' or the .json beside it are not what the .sha256 says; {mend}")
+        rows: Any = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError, MemoryError) as error:
+        raise UserError(f"features '{file}' cannot be read: {error}; {mend}") from None
     pictures = record["pictures"]
-    if rows.dtype != np.float16 or rows.ndim != 2 or len(rows) != len(pictures) or not np.isfinite(rows).all():
-        raise UserError(f"features '{file}' are not {len(pictures)} rows of float16, one for each picture named beside")
-    rows = rows.astype(np.float32)
-    return dict(zip(pictures, rows / np.linalg.norm(rows, axis=1, keepdims=True), strict=True))
+    lengths = np.linalg.norm(rows.astype(np.float32), axis=1) if getattr(rows, "ndim", 0) == 2 else np.zeros(0)
+    if len(lengths) != len(pictures) or rows.dtype != np.float16 or not (np.isfinite(lengths) & (lengths > 0)).all():
+        raise UserError(f"features '{file}' are not {len(pictures)} rows of float16 that are not zero; {mend}")
+    return dict(zip(pictures, rows.astype(np.float32) / lengths[:, None], strict=True))
+
+
+def _sums(file: Path) -> str:
+    return "".join(f"{sha256_file(path)}  {path.name}\n" for path in (file.with_suffix(".json"), file))
 
 
 def _is_record(file: Path) -> bool:
@@ -59,4 +69,5 @@ def _is_record(file: Path) -> bool:
         record = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return False
-    return isinstance(record, dict) and isinstance(record.get("pictures"), list) and "encoder" in record
+    pictures = record.get("pictures") if isinstance(record, dict) else None
+    return isinstance(pictures, list) and all(isinstance(one, str) for one in pictures) and "encoder" in record

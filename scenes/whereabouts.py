@@ -1,5 +1,6 @@
 """What to say of scenes that have a name and are not where they should be, with the line that brings them."""
 
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -13,19 +14,19 @@ def absence(names: Iterable[str], settings: Settings, study: bool = False) -> st
     It has the command that downloads those that the catalogue knows. Names that nobody knows are left to others, as are
     in a `study` the scenes that it renders first.
     """
-    first = set(renderable(names := list(names), settings)) if study and renders(settings) else ()
-    known = {name: entry for name in names if name not in first and (entry := settings.entry(name)) is not None}
+    undrawn = renderable(names := list(names), settings)
+    drawn_first = undrawn if study and renders(settings) else ()
+    known = {name: entry for name in names if name not in drawn_first and (entry := settings.entry(name)) is not None}
     folders = {name: settings.folder_of(entry) for name, entry in known.items()}
     unset = [name for name, folder in folders.items() if folder is None]
     absent = unset or [name for name, folder in folders.items() if folder is not None and not folder.exists()]
-    if not absent:
-        return None
-    if known[absent[0]].render:
-        named = ", ".join(name for name in absent if known[name].render)
-        return (
-            f"rendered rooms are not there ({named}): `pip install 'viewbench[rooms]'` brings them, and a study "
-            "renders them where VIEWBENCH_ROOMS_PYTHON (or rooms.python) names a Python that has viewbench[render]"
-        )
+    undrawn = [name for name in undrawn if name in known]
+    absent = [name for name in absent if name not in undrawn]
+    sentences = [_absent(absent, folders, bool(unset), known)] if absent else []
+    return "; ".join([*sentences, *([_undrawn(undrawn)] if undrawn else [])]) or None
+
+
+def _absent(absent: list[str], folders: dict[str, Path | None], unset: bool, known: dict[str, SceneEntry]) -> str:
     first, others = absent[0], ", ".join(absent[1:])
     command, them = _command(absent, known), "them" if others else "it"
     if unset:
@@ -37,11 +38,25 @@ def absence(names: Iterable[str], settings: Settings, study: bool = False) -> st
     return f"scene '{first}' should be in '{folders[first]}', which is not there{also}; {how} data.root or its path"
 
 
+def _undrawn(names: list[str]) -> str:
+    """What to say of rendered scenes that are not there, or not all of them."""
+    return (
+        f"rendered rooms are not there ({', '.join(names)}): the wheel viewbench-rooms brings those that ship (`make "
+        "wheels` in a clone builds it), and a study renders them where VIEWBENCH_ROOMS_PYTHON (or rooms.python) names "
+        "a Python that has viewbench[render]"
+    )
+
+
 def renderable(names: Iterable[str], settings: Settings) -> list[str]:
     """Those of the scenes that are not there and can be rendered by what their entry says."""
     entries = {name: entry for name in names if (entry := settings.entry(name)) is not None and entry.render}
     folders = {name: settings.folder_of(entry) for name, entry in entries.items()}
     return [name for name, folder in folders.items() if folder is not None and not _rendered(folder)]
+
+
+def python_of(settings: Settings) -> str:
+    """The Python that renders rooms."""
+    return str(Path(settings.rooms.python).expanduser()) if settings.rooms.python else sys.executable
 
 
 def renders(settings: Settings) -> bool:

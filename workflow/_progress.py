@@ -185,9 +185,9 @@ def _worth_reading(record: logging.LogRecord) -> bool:
 def salvage(study: Any, given: str) -> None:
     """After a failure: gathers, tracks and reports the cells that are there, so that nothing finished is lost."""
     results = Path("results") / study.name
-    if not any(results.glob("cells/**/metrics.json")) or not all(
-        (results / "scenes" / f"{scene}.json").is_file() for scene in study.scenes
-    ):
+    # A scene that could not be described, or rendered, has no cells either.
+    described = [scene for scene in study.scenes if (results / "scenes" / f"{scene}.json").is_file()]
+    if not any(any(results.glob(f"cells/*/{scene}/**/metrics.json")) for scene in described):
         return
     print("Reporting the cells that are finished; the same command takes up the rest.", file=sys.stderr)
     for arguments in (

@@ -5,7 +5,7 @@ import functools
 import hashlib
 import re
 import shlex
-import sys
+import shutil
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +21,7 @@ from ..common.errors import UserError
 from ..common.files import sha256_file
 from ..common.settings import PACKAGE, Settings
 from ..reports._tracking import is_remote
-from ..scenes.whereabouts import absence, renderable, renders
+from ..scenes.whereabouts import absence, python_of, renderable, renders
 from ..selectors import _run
 from ._depends import Lists
 from ._study import Study
@@ -64,10 +64,14 @@ class Wiring:
         return "|".join(re.escape(value) for value in values)
 
     def check_scenes(self) -> None:
-        """Raises UserError that names all scenes that are not there, and the line that brings them."""
+        """Raises UserError for scenes that are not there, with the line that brings them, and for a Python to render
+        with that is not there."""
         absent = absence(self.study.scenes, self.settings, study=True)
         if absent:
             raise UserError(absent)
+        python = python_of(self.settings)
+        if self.to_render and not shutil.which(python):
+            raise UserError(f"rooms.python (VIEWBENCH_ROOMS_PYTHON) is '{python}', which is no program; name a Python")
 
     def command(self, name: str) -> str:
         """What a step depends on that is one command and nothing else."""
@@ -105,7 +109,9 @@ class Wiring:
         return frozenset(renderable(self.study.scenes, self.settings) if renders(self.settings) else ())
 
     def forget_renders(self) -> None:
-        """Removes what says that a scene is rendered which is not there any more."""
+        """Removes what says that a scene is rendered which is not there any more, unless a run may be at it."""
+        if any(Path(".snakemake/locks").glob("*")):
+            return
         for scene in self.to_render:
             stamps = Path(self.results) / "rendered"
             for stamp in (stamps / f"{scene}.txt", *(stamps / scene).glob("*")):
@@ -121,7 +127,11 @@ class Wiring:
         """The command line that renders a scene, up to what says which frames."""
         entry = self.settings.entry(wildcards.scene)
         assert entry is not None
-        words = [self.settings.rooms.python or sys.executable, "-m", "viewbench", "render", *shlex.split(entry.render)]
+        try:
+            asked = shlex.split(entry.render)
+        except ValueError as error:
+            raise WorkflowError(f"[scenes.{wildcards.scene}] render = '{entry.render}': {error}") from None
+        words = [python_of(self.settings), "-m", "viewbench", "render", *asked]
         return shlex.join([*words, "--out", self.render_folder(wildcards)])
 
     def render_parts(self, wildcards: Any) -> list[str]:
@@ -133,6 +143,13 @@ class Wiring:
     def render_part(self, wildcards: Any) -> str:
         """Options of `viewbench render` for one part."""
         return "--path test" if wildcards.piece == "test" else f"--shard {wildcards.piece.replace('-of-', '/')}"
+
+    def seen(self, wildcards: Any) -> str:
+        """Hash of what a rendered scene says of its test views; empty where it says nothing."""
+        entry = self.settings.entry(wildcards.scene)
+        folder = self.settings.folder_of(entry) if entry else Path(wildcards.scene)
+        file = folder / "seen_test.json" if folder else None
+        return sha256_file(file) if file and file.is_file() else ""
 
     def dataset(self, wildcards: Any) -> str:
         """The group that the scene's tables put it in."""

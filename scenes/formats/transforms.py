@@ -8,7 +8,6 @@ import numpy as np
 
 from ...common.errors import UserError
 from ...common.files import read_json
-from .. import shipped_features
 from ..image_files import image_size, is_file, leaves
 from ..types import Cameras, Points, Scene, Split
 from ._transforms_write import COMPANIONS, LENS, SINGLE, TESTS, TRAIN, write
@@ -56,7 +55,7 @@ def read(root: Path, allow_outside: bool = False) -> Scene:
         train=train,
         test=test_split,
         points=points,
-        files=(*files.values(), *([point_file] if point_file else []), *shipped_features.files(root)),
+        files=(*files.values(), *([point_file] if point_file else [])),
         notes=notes,
         details={"tables": tables, "names": {key: file.name for key, file in files.items()}}
         | ({"spare": splits["spare"]} if "spare" in splits else {}),

@@ -66,8 +66,12 @@ class Job:
             "samples": self.samples,
             "quality": self.quality,
             "room_sha256": digest(room),
-            "poses_sha256": hashlib.sha256(np.ascontiguousarray(self.c2w).tobytes()).hexdigest(),
+            "poses_sha256": _sha256(self.c2w),
         }
+
+
+def _sha256(values: np.ndarray) -> str:
+    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
 
 
 def digest(room: Room) -> str:
@@ -97,7 +101,10 @@ def check_folder(out: Path, job: Job, room: Room) -> None:
         if not file.is_file():
             continue
         was, now = read_json(file, "record"), job.record(room)
+        if isinstance(was, dict):
+            was = {"quality": QUALITY, **was}  # of a render begun when there was no other
         same = now.keys() if split == job.split else ("room", "size", "room_sha256")
+        same = [key for key in same if not (key == "quality" and split == "test")]  # PNG has none
         other = next((key for key in same if not isinstance(was, dict) or was.get(key) != now[key]), None)
         if other:
             got, asked = (was.get(other) if isinstance(was, dict) else None), now[other]
@@ -149,11 +156,15 @@ def write(
 def _write_seen(out: Path, room: Room, shares: Callable[[Room, np.ndarray, np.ndarray], np.ndarray]) -> None:
     """Of each test view the share of its pixels that some training view sees, once both are there."""
     files = [out / f"transforms_{split}.json" for split in ("test", "train")]
-    if (out / _visibility.FILE).is_file() or not all(file.is_file() for file in files):
+    if not all(file.is_file() for file in files):
         return
-    test, train = ([(frame["file_path"], frame["transform_matrix"]) for frame in _frames(file)] for file in files)
-    found = shares(room, np.array([pose for _, pose in test]), np.array([pose for _, pose in train]))
-    write_json(out / _visibility.FILE, _visibility.record([name for name, _ in test], found))
+    seen, test, train = out / _visibility.FILE, *(_frames(file) for file in files)
+    poses = [np.array([frame["transform_matrix"] for frame in frames]) for frames in (test, train)]
+    of = {"room_sha256": digest(room), "poses_sha256": [_sha256(part) for part in poses]}
+    if seen.is_file() and _visibility.is_of(read_json(seen, "shares"), of):
+        return
+    names = [frame["file_path"] for frame in test]
+    write_json(seen, {**_visibility.record(names, shares(room, *poses)), **of})
 
 
 def _frames(file: Path) -> list[dict[str, Any]]:

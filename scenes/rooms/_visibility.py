@@ -44,6 +44,11 @@ def _within(camera: np.ndarray, places: np.ndarray) -> np.ndarray:
     return (z > NEAREST_M) & (np.maximum(np.abs(x), np.abs(y)) < z * np.tan(FIELD_OF_VIEW / 2))
 
 
+def is_of(found: Any, of: dict[str, Any]) -> bool:
+    """Whether the content of a seen_test.json is of the room and the poses whose hashes `of` has."""
+    return isinstance(found, dict) and all(found.get(key) == value for key, value in of.items())
+
+
 def record(names: list[str], shares: np.ndarray) -> dict[str, Any]:
     """The content of seen_test.json: of each test view the share of its pixels that some training view sees."""
     views = {name: round(float(share), 4) for name, share in zip(names, shares, strict=True)}

@@ -46,3 +46,17 @@ def test_a_row_for_each_capture_with_maps_and_views(tmp_path, capsys):
         assert (out / name).stat().st_size > 10_000
     views = list(csv.DictReader((out / "views.csv").open()))
     assert [view["split"] for view in views if view["capture"] == "room_human"] == ["train"] * 4 + ["test"] * 2
+
+
+def test_of_what_has_no_poses_or_no_times_no_motion_is_told(tmp_path, capsys):
+    from PIL import Image
+
+    photos = tmp_path / "photos"
+    photos.mkdir()
+    for i in range(3):
+        Image.new("RGB", (32, 24), (40 * i, 90, 200)).save(photos / f"{i}.png")
+    assert _main.run(["datasheet", str(photos), "--out", str(tmp_path / "sheet")]) == 0
+    (row,) = csv.DictReader((tmp_path / "sheet" / "captures.csv").open())
+    assert {key for key, value in row.items() if not value} >= {"seconds", "way_m", "speed 50 %", "turn 50 %"}
+    assert not (tmp_path / "sheet" / "maps.jpg").exists()
+    assert (tmp_path / "sheet" / "views.jpg").is_file()

@@ -1,6 +1,8 @@
 """The catalogue that ships: every entry is complete and well-formed, and every name resolves."""
 
+import dataclasses
 import json
+import sys
 import urllib.parse
 import zipfile
 from pathlib import Path
@@ -14,6 +16,7 @@ from viewbench.scenes.download import hashes
 from viewbench.scenes.download.http import kind_of
 from viewbench.scenes.download.unpack import safe
 from viewbench.scenes.formats import tum_rgbd
+from viewbench.scenes.load import open_scene
 from viewbench.scenes.splits import held_out
 from viewbench.scenes.whereabouts import absence
 
@@ -167,6 +170,26 @@ def test_a_root_that_is_not_set_is_said_first_and_a_scene_elsewhere_is_not_offer
     assert said is not None
     assert "download" not in said
     assert "correct data.root or its path" in said
+
+
+def test_rooms_that_are_not_rendered_are_told_apart_from_scenes_that_are_not_there(tmp_path):
+    drawn = settings_file.SceneEntry("drawn", render="kitchen_living --path smooth")
+    other = settings_file.SceneEntry("other")
+    known = settings(tmp_path, drawn=drawn, other=other)
+    with_python = dataclasses.replace(known, rooms=settings_file.Rooms(python=sys.executable))
+    for names in (["drawn", "other"], ["other", "drawn"]):
+        said = absence(names, known) or ""
+        assert "scene 'other' should be in" in said
+        assert "rendered rooms are not there (drawn)" in said
+        assert "drawn" not in (absence(names, with_python, study=True) or "")
+    assert absence(["drawn"], with_python, study=True) is None
+    (tmp_path / "drawn" / "train").mkdir(parents=True)  # begun, and stopped
+    assert "(drawn)" in (absence(["drawn"], known) or "")
+    with pytest.raises(UserError, match=r"rendered rooms are not there \(drawn\)"):
+        open_scene("drawn", known)
+    for split in ("train", "test"):
+        (tmp_path / "drawn" / f"transforms_{split}.json").write_text("{}")
+    assert absence(["drawn"], known) is None
 
 
 def test_a_name_of_environment_toml_comes_before_the_catalogue(tmp_path):

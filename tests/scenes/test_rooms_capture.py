@@ -97,6 +97,32 @@ def test_a_capture_is_in_the_form_of_the_shipped_one(tmp_path):
         assert image.getpixel((0, 0))[:2] == (100_001 % 251, 160)  # type: ignore[index]
 
 
+def test_what_is_seen_is_found_anew_for_other_frames(tmp_path):
+    run(tmp_path, job())
+    run(tmp_path, job("test", 4))
+    before = (tmp_path / "seen_test.json").read_bytes()
+    run(tmp_path, job("test", 4))
+    assert (tmp_path / "seen_test.json").read_bytes() == before
+    for name in ("render_test.json", "transforms_test.json"):
+        (tmp_path / name).unlink()
+    for frame in (tmp_path / "test").iterdir():
+        frame.unlink()
+    run(tmp_path, job("test", 3))
+    assert len(json.loads((tmp_path / "seen_test.json").read_text())["seen"]) == 3
+
+
+def test_a_render_begun_without_a_quality_goes_on_and_test_frames_have_none(tmp_path):
+    run(tmp_path, job(), stop_at=2)
+    record = json.loads((tmp_path / "render_train.json").read_text())
+    del record["quality"]
+    (tmp_path / "render_train.json").write_text(json.dumps(record))
+    with pytest.raises(UserError, match="quality 95, not 80"):
+        run(tmp_path, job(quality=80))
+    assert run(tmp_path, job()) == [2, 3, 4, 5]
+    run(tmp_path, job("test", 3), stop_at=1)
+    assert run(tmp_path, job("test", 3, quality=80)) == [100_001, 100_002]
+
+
 def test_a_stopped_run_goes_on_and_ends_as_an_unbroken_one(tmp_path):
     run(tmp_path / "once", job())
     assert run(tmp_path / "twice", job(), stop_at=2) == [0, 1]

@@ -1,16 +1,19 @@
 """Features that a capture brings along: taken for the pictures they were made of, and for nothing else."""
 
+import hashlib
 import json
 import shutil
 
 import numpy as np
 import pytest
 
+from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.common.settings import PACKAGE
 from viewbench.scenes import features, shipped_features
 from viewbench.scenes.digest import scene_sha256
 from viewbench.scenes.formats import transforms
+from viewbench.scenes.load import open_scene
 from viewbench.workflow.commands import _main
 
 ENCODER = "efficientnet-lite0"
@@ -36,10 +39,13 @@ def rows(root, cache, **other):
 
 
 def test_written_by_the_command_and_taken_instead_of_the_encoder(capture, tmp_path, capsys, monkeypatch):
-    before = scene_sha256(transforms.read(capture))
+    settings = settings_file.load()
+    before = scene_sha256(open_scene(str(capture), settings))
     assert _main.run(["features", str(capture), "--beside"]) == 0
     assert capsys.readouterr().out.splitlines()[0] == str(capture / "features" / f"{ENCODER}.npy")
-    assert scene_sha256(transforms.read(capture)) != before, "results know what they were made from"
+    assert scene_sha256(open_scene(str(capture), settings_file.load())) != before, (
+        "results know what they were made from"
+    )
     made = rows(capture, tmp_path / "none", batch=1)
     assert not (tmp_path / "none").exists(), "no picture was embedded"
     fresh = features.features(transforms.read(capture).train, ENCODER, tmp_path / "cache")
@@ -66,7 +72,14 @@ def test_rows_by_another_encoder_are_not_taken(capture, tmp_path, key):
     assert np.array_equal(rows(capture, tmp_path / "cache"), fresh)
 
 
-@pytest.mark.parametrize("spoil", ["cut", "fewer", "float32", "nan", "text"])
+def sums(file):
+    """Writes the sums anew, as somebody would who edits the rest."""
+    parts = (file.with_suffix(".json"), file)
+    text = "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in parts)
+    file.with_suffix(".sha256").write_text(text)
+
+
+@pytest.mark.parametrize("spoil", ["cut", "fewer", "float32", "nan", "zero", "text", "archive", "flat"])
 def test_rows_that_do_not_fit_are_named(capture, tmp_path, spoil):
     assert _main.run(["features", str(capture), "--beside"]) == 0
     file = capture / "features" / f"{ENCODER}.npy"
@@ -75,11 +88,51 @@ def test_rows_that_do_not_fit_are_named(capture, tmp_path, spoil):
         file.write_bytes(file.read_bytes()[:-9])
     elif spoil == "text":
         file.write_text("rows")
+    elif spoil == "archive":
+        with file.open("wb") as opened:
+            np.savez(opened, rows=good)
     else:
-        bad = {"fewer": good[1:], "float32": good.astype(np.float32), "nan": good * np.float16(np.nan)}[spoil]
-        np.save(file, bad)
+        bad = {"fewer": good[1:], "float32": good.astype(np.float32), "flat": good[0]}
+        bad |= {"nan": good * np.float16(np.nan), "zero": good * np.float16(0)}
+        np.save(file, bad[spoil])
+    with pytest.raises(UserError, match=r"efficientnet-lite0\.npy.*not what the \.sha256 says"):
+        rows(capture, tmp_path / "cache")
+    sums(file)
     with pytest.raises(UserError, match=r"efficientnet-lite0\.npy"):
         rows(capture, tmp_path / "cache")
+
+
+def test_a_run_that_is_stopped_between_its_files_leaves_nothing_that_is_taken(capture, tmp_path, monkeypatch):
+    assert _main.run(["features", str(capture), "--beside"]) == 0
+    record = json.loads((capture / "transforms_train.json").read_text())
+    record["frames"].reverse()
+    (capture / "transforms_train.json").write_text(json.dumps(record))
+
+    def stop(*given):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(shipped_features, "write_json", stop)
+    assert _main.run(["features", str(capture), "--beside"]) == 130
+    with pytest.raises(UserError, match="not what the"):
+        rows(capture, tmp_path / "cache")
+
+
+def test_every_format_is_hashed_with_the_features_it_brings(capture, tmp_path):
+    colmap = tmp_path / "colmap"
+    assert _main.run(["convert", str(capture), "--to", "colmap", "--out", str(colmap)]) == 0
+    settings = settings_file.load()
+    before = scene_sha256(open_scene(str(colmap), settings))
+    assert _main.run(["features", str(colmap), "--beside"]) == 0
+    between = scene_sha256(open_scene(str(colmap), settings))
+    file = colmap / "features" / f"{ENCODER}.npy"
+    np.save(file, np.roll(np.load(file), 1, axis=0))
+    sums(file)
+    assert len({before, between, scene_sha256(open_scene(str(colmap), settings))}) == 3
+
+
+def test_beside_is_for_folders_of_images(capture, tmp_path, capsys):
+    assert _main.run(["features", str(capture), "--beside", "--encoder", "open_clip:A/b"]) == 2
+    assert "by NAME" in capsys.readouterr().err
 
 
 def test_a_folder_of_that_name_for_other_ends_is_left_alone(capture, tmp_path):

@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from tests.workflow.clones import Clone
+from tests.workflow.clones import Clone, take_frames
+from viewbench.common.settings import PACKAGE
 
 STUDY = """
 title: A room that is drawn first
@@ -93,6 +94,41 @@ def test_a_scene_that_is_not_there_is_drawn_and_then_chosen_from(clone, tmp_path
     assert clone.planned(**data) == {}
 
 
+def test_a_dry_run_beside_a_run_leaves_its_stamps(clone, tmp_path):
+    stamp = clone.results / "rendered" / "drawn" / "1-of-2"
+    stamp.parent.mkdir(parents=True)
+    stamp.touch()
+    locks = clone.folder / ".snakemake" / "locks"
+    locks.mkdir(parents=True)
+    (locks / "0.output.lock").touch()
+    clone.snakemake("-n", VIEWBENCH_DATA=str(tmp_path / "data"))
+    assert stamp.exists()
+    shutil.rmtree(locks)
+    clone.snakemake("-n", VIEWBENCH_DATA=str(tmp_path / "data"))
+    assert not stamp.exists()
+
+
+def test_a_python_that_is_none_is_named_before_anything_runs(clone, tmp_path):
+    done = clone.snakemake(VIEWBENCH_DATA=str(tmp_path / "data"), VIEWBENCH_ROOMS_PYTHON="/no/python")
+    assert done.returncode != 0
+    assert "'/no/python', which is no program" in done.stdout + done.stderr
+    assert not (clone.results / "logs").exists()
+
+
+def test_a_room_that_cannot_be_drawn_leaves_the_others_reported(clone, tmp_path):
+    python = tmp_path / "broken"
+    python.write_text("#!/bin/sh\nexit 1\n", encoding="utf-8")
+    python.chmod(0o755)
+    clone.edit("workflow/studies/mini.yaml", "scenes: [drawn]", "scenes: [drawn, little]")
+    little = take_frames(PACKAGE / "scenes" / "generated_room" / "human", tmp_path / "data" / "little", 20)
+    with (clone.folder / "environment.toml").open("a", encoding="utf-8") as file:
+        file.write(f'\n[scenes.little]\npath = "{little}"\nholdout = "every:5"\n')
+    done = clone.snakemake("--keep-going", VIEWBENCH_DATA=str(tmp_path / "data"), VIEWBENCH_ROOMS_PYTHON=str(python))
+    assert done.returncode != 0
+    assert "little" in (clone.results / "reports" / "table_scenes.md").read_text()
+    assert "drawn" not in (clone.results / "reports" / "table_scenes.md").read_text()
+
+
 def test_without_a_python_to_draw_with_one_line_says_what_brings_the_scene(clone, tmp_path):
     clone.edit("environment.toml", f"python = {str(tmp_path / 'python with bpy')!r}", 'python = ""')
     shutil.rmtree(tmp_path / "data", ignore_errors=True)
@@ -100,6 +136,6 @@ def test_without_a_python_to_draw_with_one_line_says_what_brings_the_scene(clone
     assert done.returncode != 0
     said = done.stdout + done.stderr
     assert "rendered rooms are not there (drawn)" in said
-    assert "viewbench[rooms]" in said
+    assert "viewbench-rooms" in said
     assert "VIEWBENCH_ROOMS_PYTHON" in said
     assert "Traceback" not in said

@@ -36,7 +36,7 @@ def command(scene: _options.Capture, out: Path, width: int | None) -> None:
     if opened.points is not None and len(opened.points):
         step = max(1, len(opened.points) // SAMPLE)
         points = np.hstack([np.round(opened.points.xyz[::step], 3), opened.points.rgb[::step]])[:SAMPLE]
-    if width is not None:
+    if width is not None and len(opened.test):
         _write_truth(opened.test, width, out.with_suffix(""))
     record = {
         "schema": 1,
@@ -67,8 +67,11 @@ def seen_of(root: Path, names: tuple[str, ...]) -> list[float] | None:
     file = root / "seen_test.json"
     if not file.is_file():
         return None
-    shares = read_json(file, "shares")["seen"]
-    return [shares[name] for name in names] if all(name in shares for name in names) else None
+    record = read_json(file, "shares")
+    shares = record.get("seen") if isinstance(record, dict) else None
+    if not isinstance(shares, dict) or not all(isinstance(shares.get(name), float | int) for name in names):
+        return None
+    return [shares[name] for name in names]
 
 
 def _write_truth(test, width: int, folder: Path) -> None:

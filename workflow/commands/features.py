@@ -16,6 +16,7 @@ from . import _options
 def command(scene: _options.Capture, encoder: str | None, beside: bool, out: Path | None) -> None:
     """Embed the training views of SCENE; what is in the cache already is not embedded again."""
     from ...common import settings as settings_file
+    from ...common.errors import UserError
     from ...scenes import features
 
     settings = settings_file.load()
@@ -23,14 +24,13 @@ def command(scene: _options.Capture, encoder: str | None, beside: bool, out: Pat
     _options.refuse_thinning(scene, opened)
     name = encoder or settings.features.encoder
     cache, batch, device = Path(settings.features.cache), settings.features.batch, settings.compute.device
+    if beside and (":" in name or not opened.root.is_dir() or opened.details.get("extracted")):
+        raise UserError("--beside is for folders of images, and for encoders by NAME (not NAME:MODEL)")
     root = None if beside else opened.root
     rows = features.features(opened.train, name, cache, batch, _options.progress("features"), device, root)
     if beside:
-        from ...common.errors import UserError
         from ...scenes import shipped_features
 
-        if ":" in name:
-            raise UserError(f"--beside is for encoders that need no argument, got '{name}'")
         pictures = [features.content_hash(path) for path in opened.train.paths]
         click.echo(shipped_features.write(opened.root, name, features.of_encoder(name), pictures, rows))
     if out is not None:

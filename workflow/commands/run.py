@@ -17,6 +17,7 @@ CATALOGUE = "VIEWBENCH_CATALOGUE"  # common/catalogue.py
 # Settings that name what is read; what is written (results/...) belongs to the folder of the study.
 READ = {
     "VIEWBENCH_DATA": ("data", "root"),
+    "VIEWBENCH_ROOMS_PYTHON": ("rooms", "python"),
     "VIEWBENCH_METRICS_LPIPS_WEIGHTS": ("metrics", "lpips_weights"),
     "VIEWBENCH_INSTANT_NGP_PATH": ("instant_ngp", "path"),
     "VIEWBENCH_INSTANT_NGP_PYTHON": ("instant_ngp", "python"),

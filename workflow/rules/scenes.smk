@@ -69,6 +69,7 @@ rule describe:
         dataset=WIRING.dataset,
         room=WIRING.room,
         walk=WIRING.walk,
+        seen=WIRING.seen,
     message:
         "describe {wildcards.scene}"
     shell:
