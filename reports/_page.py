@@ -12,7 +12,7 @@ from ..common import plugins
 from ..common.errors import UserError
 from ..common.files import read_json, write_text
 from ..common.provenance import machine
-from . import _findings, _items, _study
+from . import _findings, _items, _rooms, _study
 from ._items import Item
 from ._study import OK, Study, and_list, counted, in_order, percent, selector_words
 
@@ -51,7 +51,7 @@ def build(study_dir: Path) -> Path:
     )
     html = environment.get_template("page.html").render(
         study=study,
-        headline=[_tied(sentence) for sentence in _findings.headline(study)],
+        headline=[_tied(sentence) for sentence in _rooms.headline(study) or _findings.headline(study)],
         details=[_tied(sentence) for sentence in _findings.details(study)],
         grid=_grid_words(study),
         facts=_facts(study),

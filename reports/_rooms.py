@@ -9,11 +9,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from . import _findings
-from ._statistics import Difference, over_samples
+from ._statistics import Difference, interval, over_samples
 from ._study import Study, in_order
 
 LEAST = 2  # rooms: fewer are no sample
 ALL = ""  # in place of a walk's name
+WORDS = {
+    "better": "is better than {baseline}",
+    "worse": "is worse than {baseline}",
+    "not told apart": "cannot be told apart from {baseline}",
+    "one sample": "was compared with {baseline} in a single one",
+    "no spread": "differs from {baseline} by the same in each",
+}
 VERDICTS = ("better", "not told apart", "worse")  # of a scene by its seeds: wins, level, losses
 
 
@@ -44,6 +51,28 @@ def groups(study: Study) -> dict[str, dict[str, str]]:
     for walk in walks if len(walks) > 1 else ():
         found[walk] = {scene: info.room for scene, info in scenes.items() if info.walk == walk}
     return {name: rooms for name, rooms in found.items() if len(set(rooms.values())) >= LEAST}
+
+
+def headline(study: Study) -> list[str]:
+    """One sentence a backend and baseline about the study's subject over rooms; none for a study in a single room."""
+    subject, found = _findings.subject_of(study), groups(study)
+    if subject is None or ALL not in found:
+        return []
+    sentences = []
+    for backend in study.backends:
+        for baseline in _findings.BASELINES:
+            means = {
+                walk: item
+                for walk, rooms in found.items()
+                if (item := over_rooms(study, rooms, backend, subject, baseline, study.ratios_of(backend)))
+            }
+            if ALL in means:
+                total, number = means.pop(ALL).mean, len(set(found[ALL].values()))
+                walks = "".join(f"; {walk} walks {interval(item.mean)}" for walk, item in means.items())
+                who = subject if len(study.backends) == 1 else f"{subject} ({backend})"
+                words = WORDS[total.verdict].format(baseline=baseline)
+                sentences.append(f"Over {number} rooms {who} {words}: {interval(total)} dB{walks}.")
+    return sentences
 
 
 def over_rooms(

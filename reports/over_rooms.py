@@ -17,7 +17,7 @@ from ._tables import Entry, Table
 
 ORDER = 15
 NAME = "over_rooms"
-SPREAD = 0.035  # between selectors at a ratio, of the axis
+SPREAD = 0.025  # between selectors at a ratio, of the axis
 
 
 def build(study: Study, out: Path) -> list[Item]:

@@ -9,7 +9,7 @@ from scipy import stats
 from tests.conftest import known
 from tests.reports.fixtures import make_study
 from viewbench.reports import _rooms, over_rooms, scenes
-from viewbench.reports._statistics import over_samples
+from viewbench.reports._statistics import interval, over_samples
 from viewbench.reports._study import load
 
 SCENES = ("a", "b", "c", "d")
@@ -145,3 +145,17 @@ def test_one_sample_and_equal_samples_have_no_interval():
     assert over_samples([0.3, 0.3, 0.3]).verdict == "no spread"
     assert over_samples([0.3, 0.31, 0.29]).verdict == "better"
     assert over_samples([0.3, -2.0, 1.0]).verdict == "not told apart"
+
+
+def test_the_headline_of_several_rooms_is_over_rooms(study, tmp_path):
+    rename(study, "walk", a="human", b="smooth", c="human", d="smooth")
+    rename(study, a="one", b="one", c="two", d="two")
+    read = load(study)
+    against_uniform, against_random = _rooms.headline(read)
+    found = known(_rooms.over_rooms(read, _rooms.groups(read)[""], "splat", "maxmin", "uniform", read.ratios)).mean
+    assert against_uniform.startswith("Over 2 rooms maxmin ")
+    assert interval(found) in against_uniform
+    assert "; human walks " in against_uniform
+    assert "random" in against_random
+    rename(study, c="one", d="one")
+    assert _rooms.headline(load(study)) == []
