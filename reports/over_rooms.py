@@ -103,7 +103,8 @@ def _table(study: Study, walk: str, rooms: Mapping[str, str], out: Path) -> Item
     for backend in study.backends:
         ratios = study.ratios_of(backend)
         for baseline in baselines:
-            for selector in others:
+            # The baselines stand against each other once.
+            for selector in study.selectors if baseline == baselines[0] else others:
                 total = over_rooms(study, rooms, backend, selector, baseline, ratios)
                 if total is None:
                     continue
