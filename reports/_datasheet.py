@@ -21,10 +21,12 @@ EXAMPLES = 6  # views of a capture that are shown, the last two of them test vie
 SIZE = 1.5  # inches of one
 INLIERS = 0.99  # share of the points on each axis that a map has to show
 POINTS = 6000  # of a scene that are drawn
+NEAR_M, NEAR_DEGREES = 0.3, 15.0  # of a training view that shows nearly what a test view does
 CHART = {"train": "#0072B2", "test": "#D55E00"}
 COLUMNS = ("capture", "room", "walk", "training", "test", "pixels", "seconds", "way (m)")
-MOTION = ("speed 50 % (m/s)", "95 %", "turn 50 % (deg/s)", "95 %")
-SEEN = ("test pixels seen", "least")
+MOTION = ("speed 50 % (m/s)", "speed 95 %", "turn 50 % (deg/s)", "turn 95 %")
+NEAR = ("nearest training view (m)", f"within {NEAR_M} m and {NEAR_DEGREES:.0f}°")
+SEEN = ("test pixels seen", "least seen")
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ def table(captures: Sequence[Capture]) -> Table:
     """A row a capture: its size, how its camera moves, how much of its test views is seen. Scene units are metres."""
     known = any(capture.seen for capture in captures)
     rows = tuple(_row(capture, known) for capture in captures)
-    return Table((*COLUMNS, *MOTION, *(SEEN if known else ())), rows, 3)
+    return Table((*COLUMNS, *MOTION, *NEAR, *(SEEN if known else ())), rows, 3)
 
 
 def _row(capture: Capture, known: bool) -> tuple[Entry, ...]:
@@ -60,12 +62,25 @@ def _row(capture: Capture, known: bool) -> tuple[Entry, ...]:
         row += [Entry(f"{seconds:.0f}", seconds), Entry(f"{way:.1f}", way)]
         row += [Entry(f"{speed[k]:.2f}", speed[k]) for k in (middle, high)]
         row += [Entry(f"{turn[k]:.1f}", turn[k]) for k in (middle, high)]
+    row += _near(capture)
     if known and capture.seen:
         mean, least = float(np.mean(capture.seen)), min(capture.seen)
         row += [Entry(f"{100 * mean:.1f} %", mean), Entry(f"{100 * least:.1f} %", least)]
     elif known:
         row += [Entry("")] * 2
     return tuple(row)
+
+
+def _near(capture: Capture) -> list[Entry]:
+    """Median distance from a test view to the nearest training view, and the share with one that shows almost it."""
+    train, test = capture.scene.train.cameras, capture.scene.test.cameras
+    if not capture.scene.posed or not len(capture.scene.test):
+        return [Entry(""), Entry("")]
+    apart = np.linalg.norm(test.positions[:, None] - train.positions, axis=-1)
+    angle = np.degrees(np.arccos(np.clip(test.forward @ train.forward.T, -1, 1)))
+    middle = float(np.median(apart.min(axis=1)))
+    share = float(((apart < NEAR_M) & (angle < NEAR_DEGREES)).any(axis=1).mean())
+    return [Entry(f"{middle:.2f}", middle), Entry(f"{100 * share:.0f} %", share)]
 
 
 def length(times: np.ndarray, positions: np.ndarray) -> float:
@@ -90,7 +105,9 @@ def maps(captures: Sequence[Capture], out: Path) -> tuple[str, ...]:
     with _figures.look():
         figure, axes = _figures.grid(len(captures), 3.2, 3.2, columns=4)
         for place, capture, (way, test, cloud, colours) in zip(axes, captures, drawn, strict=True):
-            _map(place, way, test, cloud, colours)
+            # What is held out leaves gaps; a path as it was given has none.
+            whole_way = capture.scene.holdout == "given"
+            _map(place, way, test, cloud, colours, [way] if whole_way else _topview.pieces(way))
             place.set_title(capture.name)
             for split, spots in (("train", way), ("test", test)):
                 records += [{"capture": capture.name, "split": split, "x": x, "y": y} for x, y in spots]
@@ -114,9 +131,16 @@ def _flat(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
     return way, test, scene.points.xyz[kept] @ plane.T, scene.points.rgb[kept] / 255
 
 
-def _map(place: Axes, way: np.ndarray, test: np.ndarray, cloud: np.ndarray, colours: np.ndarray) -> None:
+def _map(
+    place: Axes,
+    way: np.ndarray,
+    test: np.ndarray,
+    cloud: np.ndarray,
+    colours: np.ndarray,
+    pieces: list[np.ndarray],
+) -> None:
     place.scatter(*cloud.T, c=colours, s=1.5, linewidths=0, alpha=0.55, rasterized=True)
-    for piece in _topview.pieces(way):
+    for piece in pieces:
         place.plot(*piece.T, color=CHART["train"], linewidth=1.2)
     place.plot(*test.T, "x", color=CHART["test"], markersize=4)
     most = np.quantile(cloud, (1 - INLIERS, INLIERS), axis=0) if len(cloud) else way[:0]  # stray points are far away

@@ -1,7 +1,8 @@
-"""Differences to plain choice with rooms as the sample: what holds for a room that was not tried.
+"""Differences to plain choice with rooms as the sample: what holds over rooms of such a kind.
 
-A mixed model with a random effect of the room gives the same mean and, where every room has as many cells, the same
-interval: then the rooms' means are all it uses.
+A mixed model of the differences with a random effect of the room gives the same mean and, with n − 1 degrees of freedom
+and where it finds a spread between rooms, the same interval. Where it finds none, so that the rooms lie closer together
+than their seeds explain, the interval is by the seeds' error instead of by that luck.
 """
 
 import math
@@ -9,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from . import _findings
-from ._statistics import Difference, interval, over_samples
+from ._statistics import Difference, interval, over_ratios, over_samples, summary
 from ._study import Study, in_order
 
 LEAST = 2  # rooms: fewer are no sample
@@ -83,14 +84,25 @@ def over_rooms(
     `rooms` has the room of each scene that counts. None where fewer than two rooms have both sides.
     """
     found: dict[str, list[float]] = {}
+    variances: dict[str, list[float]] = {}
     verdicts: list[str] = []
     for scene in study.scenes:
         if scene in rooms and (item := _findings.against(study, backend, scene, selector, baseline, tuple(ratios))):
             found.setdefault(rooms[scene], []).append(item.mean)
+            sides = (over_ratios(study.find(backend, scene, name), ratios) for name in (selector, baseline))
+            variances.setdefault(rooms[scene], []).append(math.fsum(_of_mean(side) for side in sides))
             verdicts.append(item.verdict)
     if len(found) < LEAST:
         return None
     means = {room: math.fsum(values) / len(values) for room, values in found.items()}
     counts = [sum(verdict == word for verdict in verdicts) for word in VERDICTS]
     counts[1] = len(verdicts) - counts[0] - counts[2]  # a single sample tells nothing either
-    return OverRooms(means, over_samples(list(means.values())), (counts[0], counts[1], counts[2]))
+    of_rooms = (math.fsum(values) / len(values) ** 2 for values in variances.values())
+    by_seeds = math.sqrt(math.fsum(of_rooms)) / len(means)
+    return OverRooms(means, over_samples(list(means.values()), by_seeds), (counts[0], counts[1], counts[2]))
+
+
+def _of_mean(values: Sequence[float]) -> float:
+    """Variance of the mean of so many seeds; 0 of a single one, which says nothing of it."""
+    found = summary(values)
+    return 0.0 if found.std is None else found.std**2 / found.n

@@ -67,16 +67,21 @@ def difference(ours: Sequence[float], theirs: Sequence[float]) -> Difference:
     return Difference(mean, mean - half, mean + half)
 
 
-def over_samples(values: Sequence[float]) -> Difference:
-    """The mean of differences that are one sample each, with Student's interval (n − 1 degrees of freedom)."""
+def over_samples(values: Sequence[float], least: float = 0.0) -> Difference:
+    """The mean of differences that are one sample each, with Student's interval (n − 1 degrees of freedom).
+
+    `least` is a standard error of the mean that is known from elsewhere, as from what each sample was averaged of:
+    where the samples happen to lie closer together than that, it stands in.
+    """
     found = summary(values)
     if found.std is None:
         return Difference(found.mean, None, None)
-    if found.std == 0:
+    error = max(found.std / math.sqrt(found.n), least)
+    if error == 0:
         return Difference(found.mean, None, None, "no spread")
     from scipy.special import stdtrit
 
-    half = float(stdtrit(found.n - 1, 0.5 + LEVEL / 2)) * found.std / math.sqrt(found.n)
+    half = float(stdtrit(found.n - 1, 0.5 + LEVEL / 2)) * error
     return Difference(found.mean, found.mean - half, found.mean + half)
 
 

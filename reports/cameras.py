@@ -53,7 +53,7 @@ def _figure(study: Study, scene: SceneInfo, cells: list[Cell], out: Path) -> Ite
             place.set_title(f"{cell.selector}: {len(indices)} of {scene.n_train} views")
             records += _records(cell.selector, scene.name, indices, train[indices], forward[indices])
         _scale_bar(axes[0], low, high)
-        figure.legend(handles=_handles(len(points) > 0), loc="outside lower center", ncols=4)
+        figure.legend(handles=_handles(len(points) > 0), loc="outside lower center", ncols=min(4, len(axes)))
         files = _figures.save(figure, out, f"cameras_{scene.name}", records)
     caption = (
         f"{scene.name} from above at {percent(study.middle_ratio())}, seed {study.first_seed}. Coloured: the chosen "

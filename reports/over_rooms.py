@@ -1,4 +1,4 @@
-"""Does a way of choosing win in rooms that were not tried? Differences to plain choice, with rooms as the sample."""
+"""Does a way of choosing win over rooms, and not in one alone? Differences to plain choice, rooms as the sample."""
 
 import re
 from collections.abc import Mapping
@@ -63,7 +63,8 @@ def _figure(study: Study, baseline: str, out: Path) -> Item | None:
         files = _figures.save(figure, out, NAME, records)
     caption = (
         f"Difference of mean PSNR to {baseline} (the line at 0), the mean over rooms; above the line is better. Bars: "
-        "the 95 % interval (Student's) with rooms as the sample, which is what another room of this kind might give; "
+        "the 95 % interval (Student's) of that mean with rooms as the sample; a single further room may differ by more "
+        "than twice as much; "
         "small marks: each room's own difference, the mean of its seeds and walks. At a ratio the selectors stand side "
         "by side so that their bars can be told apart."
     )
@@ -142,10 +143,13 @@ def _caption(rooms: Mapping[str, str]) -> str:
     several = " Walks through one room are averaged and count as one." if shared else ""
     return (
         "Difference of mean PSNR in dB; positive means that the selector is better. Here rooms are the sample: in each "
-        "the seeds are averaged, and the interval (Student's, 95 %) is of what another room of this kind might give, "
-        f"if these were drawn from such.{several} Few rooms give wide intervals, and rightly so. Won, level and lost "
-        "count scenes by the intervals of their own seeds. “Without one room” is the range of the mean when each room "
-        "in turn is left out: a verdict that hangs on one of them shows there."
+        "the seeds are averaged, and the interval (Student's, 95 %) is of the mean over rooms of this kind, if these "
+        "were drawn from such: a single further room may differ by more than twice as much. Where rooms lie closer "
+        f"together than their seeds explain, the interval is by the seeds' error.{several} Few rooms give wide "
+        "intervals, and rightly so; of every twenty intervals one misses by chance. “Over all” averages the ratios "
+        "that the backend ran. Won, level and lost count scenes by the intervals of their own seeds, which few seeds "
+        "leave level. “Without one room” is the range of the mean when each room in turn is left out: whether its sign "
+        "hangs on one of them."
     )
 
 

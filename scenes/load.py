@@ -105,5 +105,7 @@ def detect(root: Path) -> str:
         raise UserError(f"'{root}' is a file and no video; name the folder that the capture is in")
     if not any(root.iterdir()):
         raise UserError(f"'{root}' is empty; name the folder that the capture is in")
+    if (root / "render_train.json").is_file() or (root / "render_test.json").is_file():
+        raise UserError(f"'{root}' is a render of a room that was not finished; run its `viewbench render` again")
     known = ", ".join(plugins.names(FORMATS))
     raise UserError(f"'{root}' is in no known format ({known}); see `viewbench list formats`, or force one by --format")

@@ -11,12 +11,13 @@ from pathlib import Path
 
 ADDRESS = "VIEWBENCH_FORK_SERVER"  # path of the server's socket, for the jobs of a study
 PASSED_ON = (signal.SIGINT, signal.SIGTERM)  # to the job, but those that are ignored here
+PREFIX = "VIEWBENCH_FORK_SERVER_PREFIX"  # sys.prefix of the server: another environment's jobs are not its own
 LENGTH = 4  # bytes before a request, which say how long it is
 
 
 def run(arguments: list[str]) -> int | None:
     """Exit status of the command; None where no server is in reach, so that the command is to be run here."""
-    if not os.environ.get(ADDRESS):
+    if not os.environ.get(ADDRESS) or os.environ.get(PREFIX, sys.prefix) != sys.prefix:
         return None
     import json
     import socket

@@ -27,7 +27,7 @@ import traceback
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ._fork_client import ADDRESS, LENGTH, PASSED_ON
+from ._fork_client import ADDRESS, LENGTH, PASSED_ON, PREFIX
 
 PACKAGES = ("click", "numpy", "PIL.Image", "plyfile", "scipy.ndimage", "scipy.spatial", "skimage.metrics")
 LONGEST = 80  # bytes of a folder's name that leave room for that of a socket in it
@@ -42,7 +42,7 @@ def start(workflow: Any, threads: int) -> None:
     folder = tempfile.mkdtemp(prefix="viewbench-", dir=None if len(tempfile.gettempdir()) < LONGEST else "/tmp")
     address = str(Path(folder) / "jobs")
     server = subprocess.Popen(command(address), stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
-    os.environ[ADDRESS] = address
+    os.environ[ADDRESS], os.environ[PREFIX] = address, sys.prefix
 
     def stop() -> None:
         server.communicate()  # it ends when its standard input does, and so also when this process is killed
@@ -151,6 +151,7 @@ def run(request: dict[str, Any], fds: list[int]) -> NoReturn:
         os.environ.clear()
         os.environ.update(request["environment"])
         os.environ.pop(ADDRESS, None)
+        os.environ.pop(PREFIX, None)
         sys.argv = ["viewbench", *request["arguments"]]
         importlib.invalidate_caches()
         from .commands import _main

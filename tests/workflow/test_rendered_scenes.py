@@ -40,7 +40,7 @@ STAND_IN = """#!{python}
 import sys
 import numpy as np
 from viewbench.scenes.rooms import _points, _rendering, _visibility
-from viewbench.workflow.commands import _main
+from viewbench.__main__ import main
 
 class Renderer:
     def __init__(self, room, size, threads=1):
@@ -57,7 +57,9 @@ _rendering.Renderer = Renderer
 _points.seen = lambda room: (np.random.default_rng(0).uniform(0, 3, (50, 3)), np.zeros((50, 3), np.uint8))
 _visibility.seen_shares = lambda room, test, train: np.full(len(test), 0.9)
 assert sys.argv[1:3] == ["-m", "viewbench"], sys.argv
-sys.exit(_main.run(sys.argv[3:]))
+sys.prefix = "/elsewhere"  # of an environment of its own, where the study's fork server has no business
+del sys.argv[1:3]
+main()
 """
 
 

@@ -39,9 +39,8 @@ def command(scenes: tuple[str, ...], out: Path) -> None:
 
 
 def _keys(table) -> list[str]:
-    """Names of columns for programs: each once."""
-    names = [column.replace(" (m)", "_m").replace(" (m/s)", "").replace(" (deg/s)", "") for column in table.columns]
-    return [f"{names[i - 1].split()[0]} {name}" if name in ("95 %", "least") else name for i, name in enumerate(names)]
+    """Names of columns for programs."""
+    return [column.replace(" (m)", "_m").replace(" (m/s)", "").replace(" (deg/s)", "") for column in table.columns]
 
 
 def _capture(name: str, settings: "Settings") -> "Capture":
