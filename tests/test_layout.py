@@ -92,7 +92,7 @@ status = _main.run(["select", "office_smooth", "--count", "3", "--dry-run"])
 print(status)
 """
     alone = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
-    assert alone.stdout == "1\n"
+    assert alone.stdout == "2\n"
     assert "the wheel viewbench-rooms brings those that ship" in alone.stderr
     with zipfile.ZipFile(rooms) as archive:
         archive.extractall(site)

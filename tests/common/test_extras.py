@@ -40,7 +40,8 @@ def test_the_extra_that_is_named_brings_the_package(module):
 
 def test_every_package_of_an_extra_has_its_line():
     known = {package.name.lower().replace("_", "-") for package in extras.OPTIONAL.values()}
-    assert set().union(*(packages for extra, packages in EXTRAS.items() if extra != "dev")) <= known
+    named = set().union(*(packages for extra, packages in EXTRAS.items() if extra != "dev"))
+    assert named - {"viewbench-rooms"} <= known, "but the rooms, which are data and not imported"
 
 
 def test_what_is_optional_is_not_in_the_light_install():

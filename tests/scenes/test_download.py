@@ -350,9 +350,9 @@ def test_a_directory_that_is_larger_than_the_tail_is_one_more_request(server, li
     text = f'archives = {{ all = {{ address = "{server.url("/all.zip")}" }} }}\n'
     scene = listed(text + '[set.scenes]\nroom = { archive = "all", prefix = "room/" }')
     assert contents(fetch(scene)) == capture
-    directory = server.asked[2]
-    assert directory.sent > TAIL
-    assert len(server.asked) == 4
+    assert max(asked.sent for asked in server.asked) > TAIL, "the directory in one request"
+    # By range, since on a busy machine one may be asked for again.
+    assert len({asked.range for asked in server.asked}) == 4
 
 
 def test_an_archive_that_was_kept_is_used_and_by_force_fetched_again(server, large, fetch, capture):
