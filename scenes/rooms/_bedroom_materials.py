@@ -1,17 +1,14 @@
 """Materials and textures that only the bedroom has; the rest are those of `_materials`."""
 
-from collections.abc import Callable, Iterable
-
-import numpy as np
-
 from . import _bedroom_faces as faces
 from . import _bedroom_prints as prints
 from . import _bedroom_textures as made
 from . import _materials
+from ._materials import Texture
 from ._surfaces import wood
 from ._types import Material
 
-TEXTURES: dict[str, Callable[[], np.ndarray]] = {
+TEXTURES: dict[str, Texture] = {
     "herringbone": made.herringbone,
     "pine": lambda: made.boards(350, "9c5f28", "e2b874", 8, 26),
     "whitewash": lambda: made.boards(355, "b8a68a", "f6efe0", 8, 20, 0.3),
@@ -52,11 +49,3 @@ def _material(name: str) -> Material:
 
 
 MATERIALS = {**_materials.MATERIALS, **{name: _material(name) for name in TEXTURES}}
-
-
-def textures(materials: Iterable[Material]) -> dict[str, np.ndarray]:
-    """The textures that these materials name, each made anew."""
-    materials = list(materials)
-    named = {material.colour for material in materials if isinstance(material.colour, str)}
-    own = {name: make() for name, make in TEXTURES.items() if name in named}
-    return {**_materials.textures(materials), **own}

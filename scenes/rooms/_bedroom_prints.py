@@ -3,7 +3,7 @@
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from ._noise import between, byte_image, colour, hsv, mix, noise, whole
+from ._noise import between, byte_image, colour, hsv, mix, noise, tiled, whole
 
 WIDE, HIGH = 256, 352  # pixels of a poster; there are two rows of four
 NOTE = 128  # pixels of a note; there are four rows of four
@@ -14,9 +14,9 @@ INKS = ("26303c", "7a2b22", "2b4a2c", "3a2c52")
 def posters() -> np.ndarray:
     """Eight: a map, mountains, a fern, a concert, the moon, discs, stars, a forest."""
     random = np.random.default_rng(401)
-    row = [_map(), _mountains(), _fern(), _concert()]
+    above = [_map(), _mountains(), _fern(), _concert()]
     below = [_moons(), _discs(random), _stars(random), _forest()]
-    return byte_image(np.concatenate([np.concatenate(row, 1), np.concatenate(below, 1)]))
+    return byte_image(tiled([*above, *below], 4))
 
 
 def _grid() -> tuple[np.ndarray, np.ndarray]:
@@ -134,7 +134,7 @@ def notes() -> np.ndarray:
     """Sixteen: written notes, drawings, tables and snapshots."""
     random = np.random.default_rng(420)
     made = [(_written, _snapshot, _table, _snapshot)[k % 4](random, k) for k in range(16)]
-    return byte_image(np.concatenate([np.concatenate(made[4 * k : 4 * k + 4], 1) for k in range(4)]))
+    return byte_image(tiled(made, 4))
 
 
 def _written(random: np.random.Generator, k: int) -> np.ndarray:

@@ -4,7 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from . import _furniture
 from ._builder import WHITE, Builder
+from ._furniture import cell
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -61,23 +63,13 @@ def curtain(room: Builder, material: str, corner: Any, along: Any, wide: float, 
     curved(room, material, points, (wide * 1.6 / repeat, high / repeat))
 
 
-def cell(which: int, columns: int, rows: int) -> tuple[float, float, float, float]:
-    """Texture of one of so many pictures, upright."""
-    column, row = which % columns, which // columns
-    inset = 0.004
-    left, right = column / columns + inset, (column + 1) / columns - inset
-    return (left, (row + 1) / rows - inset, right, row / rows + inset)
-
-
 def poster(room: Builder, which: int, corner: Any, along: Any, high: float, frame: str = "") -> None:
     """One of the eight posters on a wall, its lower left corner there; in a frame of that material if one is given."""
     corner, along = np.asarray(corner, float), np.asarray(along, float)
     wide, outward = high * 256 / 352, np.cross(along, UP)
     room.sheet("posters", corner + outward * (0.024 if frame else 0.006), along * wide, UP * high, cell(which, 4, 2))
     if frame:
-        first = corner - along * 0.025 - UP * 0.025
-        last = corner + along * (wide + 0.025) + UP * (high + 0.025) + outward * 0.02
-        room.box(frame, np.minimum(first, last), np.maximum(first, last), repeat=0.3)
+        _furniture.frame(room, frame, corner, along, wide, high, 0.025, 0.02)
 
 
 def note(room: Builder, which: int, corner: Any, u: Any, v: Any) -> None:

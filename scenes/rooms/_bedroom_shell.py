@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from ._bedroom_shapes import cell, curtain, garment, pillow, poster, upright
+from ._bedroom_shapes import curtain, garment, pillow, poster, upright
 from ._builder import Builder
+from ._furniture import cell
 
 X, Y, Z = 3.4, 4.2, 2.45
 KNEE, RIDGE = 1.5, 1.0  # height of the low wall x = 0, and where the slope above it meets the ceiling

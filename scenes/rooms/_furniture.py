@@ -1,6 +1,7 @@
 """Things that stand in rooms: tables, chairs, books, jars, pictures, plants."""
 
 import colorsys
+from typing import Any
 
 import numpy as np
 
@@ -53,21 +54,41 @@ def chair(room: Builder, x: float, y: float, back: tuple[int, int], random: np.r
     room.box("paint", low, high, colour=colour)
 
 
+def cell(
+    which: int, columns: int, rows: int, inset: tuple[float, float] = (0.004, 0.004)
+) -> tuple[float, float, float, float]:
+    """The part of a texture of `columns` x `rows` pictures that one of them takes, upright, `inset` from its edges."""
+    column, row = which % columns, which // columns % rows
+    across, down = inset
+    left, right = column / columns + across, (column + 1) / columns - across
+    return (left, (row + 1) / rows - down, right, row / rows + down)
+
+
+def frame(
+    room: Builder, material: str, corner: Any, u: Any, wide: float, high: float, margin: float, deep: float
+) -> None:
+    """A board on a wall that is `margin` larger than what hangs before it and `deep` thick.
+
+    That has its lower left corner there and its width along the unit vector `u`.
+    """
+    rise = np.array([0.0, 0.0, 1.0])
+    outward = np.cross(u, rise)
+    first = corner - u * margin - rise * margin
+    last = corner + u * (wide + margin) + rise * (high + margin) + outward * deep
+    room.box(material, np.minimum(first, last), np.maximum(first, last), repeat=0.3)
+
+
 def picture(room: Builder, which: int, corner: tuple, along: tuple, wide: float, high: float) -> None:
     """One of the eight pictures in a frame on a wall, its lower left corner there and its width along a unit vector."""
     place, u = np.asarray(corner, float), np.asarray(along, float)
     outward = np.cross(u, (0, 0, 1))
-    column, row = which % 4, which // 4
-    uv = (column / 4 + 0.004, (row + 1) / 2 - 0.004, (column + 1) / 4 - 0.004, row / 2 + 0.004)
-    room.sheet("art", place + outward * 0.022, u * wide, (0, 0, high), uv=uv)
-    first = place - u * 0.03 - np.array([0, 0, 0.03])
-    last = place + u * (wide + 0.03) + np.array([0, 0, high + 0.03]) + outward * 0.018
-    room.box("wood_dark", np.minimum(first, last), np.maximum(first, last), repeat=0.3)
+    room.sheet("art", place + outward * 0.022, u * wide, (0, 0, high), uv=cell(which, 4, 2))
+    frame(room, "wood_dark", place, u, wide, high, 0.03, 0.018)
 
 
 def spine(row: int, column: int) -> tuple[float, float, float, float]:
     """Texture of one of the 4 x 32 spines of books."""
-    return (column / 32 + 0.002, (row + 1) / 4 - 0.01, (column + 1) / 32 - 0.002, row / 4 + 0.01)
+    return cell(32 * row + column, 32, 4, (0.002, 0.01))
 
 
 def bookcase(room: Builder, y0: float, y1: float, random: np.random.Generator) -> None:

@@ -1,13 +1,10 @@
 """Materials of `glass_living` by name: its own, and those that it takes from what rooms share."""
 
-from collections.abc import Callable, Iterable
-
-import numpy as np
-
 from . import _glass_pictures, _glass_textures, _materials
+from ._materials import Texture
 from ._types import Material
 
-TEXTURES: dict[str, Callable[[], np.ndarray]] = {
+TEXTURES: dict[str, Texture] = {
     "terrazzo": _glass_textures.terrazzo,
     "fans_green": lambda: _glass_textures.fans(250, "2f6d57", "b6d3ac", "e2bd62"),
     "fans_cream": lambda: _glass_textures.fans(270, "f8eecf", "d4aa7c", "962f44"),
@@ -45,10 +42,3 @@ MATERIALS = {
     },
     **{name: Material("diffuse", name) for name in ("sunburst", "brocade", "records", "posters", "deco_rug")},
 }
-
-
-def textures(materials: Iterable[Material]) -> dict[str, np.ndarray]:
-    """The textures that these materials name, each made anew."""
-    wanted = list(materials)
-    named = {material.colour for material in wanted if isinstance(material.colour, str)}
-    return {**_materials.textures(wanted), **{name: make() for name, make in TEXTURES.items() if name in named}}

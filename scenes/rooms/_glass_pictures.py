@@ -3,7 +3,7 @@
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from ._noise import between, byte_image, colour, mix, noise, whole
+from ._noise import between, byte_image, colour, mix, noise, tiled, whole
 
 SIDE = 256  # pixels of one poster; `posters` is two rows of four
 GOLD, WINE, GREEN, CREAM, NIGHT = (214, 172, 82), (122, 32, 52), (36, 92, 76), (242, 230, 204), (22, 28, 48)
@@ -16,7 +16,7 @@ def posters() -> np.ndarray:
     for k, picture in enumerate(drawn):
         paper = 0.82 + 0.3 * noise(SIDE, SIDE, 230 + k, 5, 6, 0.7)
         pictures.append(np.asarray(picture) / 255 * paper[..., None])
-    return byte_image(np.concatenate([np.concatenate(row, 1) for row in (pictures[:4], pictures[4:])]))
+    return byte_image(tiled(pictures, 4))
 
 
 def _canvas(fill: tuple) -> tuple[Image.Image, ImageDraw.ImageDraw]:

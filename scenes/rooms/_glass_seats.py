@@ -4,7 +4,8 @@ import numpy as np
 
 from ._builder import Builder
 from ._furniture import BOOK, FRUIT, any_colour, leaves
-from ._glass_things import UPRIGHT, books, bottles, bunch, chess_game, lamp, poster, turned, vase
+from ._glass_things import UPRIGHT, books, bottles, bunch, chess_game, lamp, poster, vase
+from ._spot import Spot
 
 TABLE = (1.9, 1.4, 3.1, 2.1, 0.42)  # the low table: x and y from, x and y to, height of its plate's lower side
 CART = (4.15, 0.1, 4.95, 0.52)
@@ -49,18 +50,19 @@ def _sofa(room: Builder) -> None:
 
 def _armchair(room: Builder, x: float, y: float, angle: float) -> None:
     """A low club chair; unturned it looks to -y."""
+    at = Spot(room, x, y, angle)
     for low, high in (
         ((-0.4, -0.38, 0.1), (0.4, 0.4, 0.4)),
         ((-0.4, 0.2, 0.4), (0.4, 0.4, 0.78)),
         ((-0.4, -0.36, 0.4), (-0.24, 0.2, 0.6)),
         ((0.24, -0.36, 0.4), (0.4, 0.2, 0.6)),
     ):
-        turned(room, "velvet_wine", (x, y), angle, low, high, 0.6)
-    turned(room, "chevrons", (x, y), angle, (-0.18, 0.04, 0.41), (0.18, 0.17, 0.74), 0.45)
-    turned(room, "gold", (x, y), angle, (-0.41, -0.39, 0.06), (0.41, 0.41, 0.1))
+        at.box("velvet_wine", low, high, repeat=0.6)
+    at.box("chevrons", (-0.18, 0.04, 0.41), (0.18, 0.17, 0.74), repeat=0.45)
+    at.box("gold", (-0.41, -0.39, 0.06), (0.41, 0.41, 0.1))
     for dx in (-0.3, 0.3):
         for dy in (-0.3, 0.3):
-            turned(room, "walnut", (x, y), angle, (dx - 0.03, dy - 0.03, 0), (dx + 0.03, dy + 0.03, 0.06))
+            at.box("walnut", (dx - 0.03, dy - 0.03, 0), (dx + 0.03, dy + 0.03, 0.06))
 
 
 def _low_table(room: Builder, random: np.random.Generator) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ._builder import Builder
-from ._furniture import BOOK, TAU, any_colour, bottle, spine
+from ._furniture import BOOK, TAU, any_colour, bottle, cell, frame, spine
 
 UPRIGHT = (0, 1, 1, 0)  # of a texture on a sheet that stands: all of it, its upper edge above
 IVORY, EBONY = (0.7, 0.6, 0.42), (0.05, 0.03, 0.03)
@@ -11,8 +11,7 @@ IVORY, EBONY = (0.7, 0.6, 0.42), (0.05, 0.03, 0.03)
 
 def poster(which: int) -> tuple[float, float, float, float]:
     """Where one of the eight posters is in their texture."""
-    column, row = which % 4, which // 4
-    return (column / 4 + 0.003, (row + 1) / 2 - 0.006, (column + 1) / 4 - 0.003, row / 2 + 0.006)
+    return cell(which, 4, 2, (0.003, 0.006))
 
 
 def framed(room: Builder, which: int, corner: tuple, along: tuple, wide: float, high: float) -> None:
@@ -21,22 +20,7 @@ def framed(room: Builder, which: int, corner: tuple, along: tuple, wide: float, 
     outward = np.cross(u, (0, 0, 1))
     room.sheet("posters", place + outward * 0.03, u * wide, (0, 0, high), uv=poster(which))
     for material, margin, deep in (("gold", 0.045, 0.018), ("walnut", 0.02, 0.025)):
-        first = place - u * margin - np.array([0, 0, margin])
-        last = place + u * (wide + margin) + np.array([0, 0, high + margin]) + outward * deep
-        room.box(material, np.minimum(first, last), np.maximum(first, last), repeat=0.3)
-
-
-def turned(
-    room: Builder, material: str, origin: tuple, angle: float, low: tuple, high: tuple, repeat: float = 0.5
-) -> None:
-    """A box of a thing that as a whole is turned by `angle` about (x, y) `origin`; its corners from there."""
-    a, b = np.asarray(low, float), np.asarray(high, float)
-    middle, half = (a + b) / 2, (b - a) / 2
-    cosine, sine = np.cos(angle), np.sin(angle)
-    x = origin[0] + cosine * middle[0] - sine * middle[1]
-    y = origin[1] + sine * middle[0] + cosine * middle[1]
-    centre = np.array([x, y, middle[2]])
-    room.box(material, centre - half, centre + half, repeat=repeat, angle=angle)
+        frame(room, material, place, u, wide, high, margin, deep)
 
 
 def vase(room: Builder, foot: tuple, wide: float, high: float) -> None:

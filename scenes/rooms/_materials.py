@@ -1,13 +1,15 @@
 """Materials that rooms share, by name, and the texture that each name of one stands for."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
 from . import _cloth, _pictures, _surfaces
 from ._types import VERTEX_COLOUR, Material
 
-TEXTURES: dict[str, Callable[[], np.ndarray]] = {
+Texture = Callable[[], np.ndarray]  # makes it: (H, W, 3) uint8, sRGB
+
+TEXTURES: dict[str, Texture] = {
     "floor": _surfaces.planks,
     "wallpaper": _surfaces.wallpaper,
     "plaster": _surfaces.plaster,
@@ -59,7 +61,7 @@ MATERIALS = {
 }
 
 
-def textures(materials: Iterable[Material]) -> dict[str, np.ndarray]:
-    """The textures that these materials name, each made anew."""
+def textures(materials: Iterable[Material], own: Mapping[str, Texture] | None = None) -> dict[str, np.ndarray]:
+    """The textures that these materials name, each made anew; a room's `own` go before those that rooms share."""
     named = {material.colour for material in materials if isinstance(material.colour, str)}
-    return {name: make() for name, make in TEXTURES.items() if name in named}
+    return {name: make() for name, make in {**TEXTURES, **(own or {})}.items() if name in named}

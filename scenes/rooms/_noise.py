@@ -1,6 +1,7 @@
 """What textures are made of: fractal noise, mixtures of colours, grids of coordinates."""
 
 import colorsys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -61,3 +62,9 @@ def byte_image(values: np.ndarray) -> np.ndarray:
 def whole(values: Any) -> tuple[int, ...]:
     """The values as a tuple of integers, which is what Pillow takes for colours and places."""
     return tuple(int(value) for value in values)
+
+
+def tiled(pictures: Sequence[np.ndarray], columns: int) -> np.ndarray:
+    """(H, W, 3) of pictures of one size, row by row, so many in a row."""
+    rows = [pictures[k : k + columns] for k in range(0, len(pictures), columns)]
+    return np.concatenate([np.concatenate(row, 1) for row in rows])

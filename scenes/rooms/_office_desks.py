@@ -5,8 +5,9 @@ import numpy as np
 from ._builder import Builder
 from ._furniture import BOOK, LETTER_BLOCK, spine
 from ._office_green import sprig
+from ._office_materials import cell
 from ._office_seats import BLACK
-from ._office_spot import Spot, cell
+from ._spot import Spot
 
 WIDE, DEEP, TOP = 1.4, 0.7, 0.74  # of a desk
 CUP = [(1e-3, 0), (0.036, 0), (0.042, 0.095), (0.038, 0.095), (0.032, 0.01), (1e-3, 0.01)]

@@ -1,15 +1,11 @@
-"""Materials that only `open_office` has, and the textures of all that it uses."""
+"""Materials of `open_office` by name: its own, and those that it takes from what rooms share."""
 
-from collections.abc import Callable, Iterable
-
-import numpy as np
-
-from . import _office_city, _office_pictures, _office_screens, _office_textures
-from ._materials import MATERIALS, textures
+from . import _furniture, _materials, _office_city, _office_pictures, _office_screens, _office_textures
+from ._materials import Texture
 from ._office_textures import boards, tweed
 from ._types import VERTEX_COLOUR, Material
 
-OFFICE_TEXTURES: dict[str, Callable[[], np.ndarray]] = {
+TEXTURES: dict[str, Texture] = {
     "carpet": _office_textures.carpet,
     "chevron": _office_textures.chevron,
     "mineral": _office_textures.mineral,
@@ -35,9 +31,9 @@ OFFICE_TEXTURES: dict[str, Callable[[], np.ndarray]] = {
     "prism": _office_pictures.prism,
 }
 
-OFFICE_MATERIALS = {
-    **{name: MATERIALS[name] for name in ("books", "letters", "leaf", "steel", "paint", "glaze", "chrome", "glass")},
-    **{name: Material("diffuse", name) for name in OFFICE_TEXTURES},
+MATERIALS = {
+    **_materials.MATERIALS,
+    **{name: Material("diffuse", name) for name in TEXTURES},
     "chevron": Material("glossy", "chevron", 0.3),
     "birch": Material("glossy", "birch", 0.35),
     "whiteboard": Material("glossy", "whiteboard", 0.2),
@@ -50,8 +46,6 @@ OFFICE_MATERIALS = {
 }
 
 
-def office_textures(materials: Iterable[Material]) -> dict[str, np.ndarray]:
-    """The textures that these materials name, each made anew."""
-    given = list(materials)
-    named = {material.colour for material in given if isinstance(material.colour, str)}
-    return textures(given) | {name: make() for name, make in OFFICE_TEXTURES.items() if name in named}
+def cell(k: int, columns: int, rows: int) -> tuple[float, float, float, float]:
+    """The part of an office texture that the k-th of `columns` x `rows` pictures takes, for what stands upright."""
+    return _furniture.cell(k, columns, rows, (0.002, 0.004))

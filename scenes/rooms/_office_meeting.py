@@ -6,9 +6,10 @@ from ._builder import Builder
 from ._furniture import BOOK, spine
 from ._office_desks import CUP, TONES
 from ._office_green import sprig, tree
+from ._office_materials import cell
 from ._office_seats import BLACK, pouf, shell_chair, sofa
-from ._office_spot import Spot, cell
 from ._office_storage import printer, shelves
+from ._spot import Spot
 
 CLOTHS = ("tweed_gold", "tweed_grey", "tweed_blue", "tweed_grey", "tweed_gold", "tweed_blue")
 

@@ -1,7 +1,7 @@
 """Chairs, a sofa and stools of `open_office`, each about the middle of its place, its front ahead."""
 
 from ._builder import Builder
-from ._office_spot import Spot
+from ._spot import Spot
 
 BLACK = (0.03, 0.032, 0.036)
 

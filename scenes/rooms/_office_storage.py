@@ -6,8 +6,9 @@ from ._builder import Builder
 from ._furniture import BOOK, LETTER_BLOCK, spine
 from ._office_desks import CUP, TONES
 from ._office_green import sprig
+from ._office_materials import cell
 from ._office_seats import BLACK
-from ._office_spot import Spot, cell
+from ._spot import Spot
 
 DOORS = ("oak", "tweed_blue", "birch", "oak", "tweed_gold", "birch", "tweed_grey", "oak")
 

@@ -5,10 +5,11 @@ import numpy as np
 from ._builder import Builder
 from ._office_desks import TONES, desk
 from ._office_green import sprig, tree
+from ._office_materials import cell
 from ._office_meeting import poster
 from ._office_seats import BLACK, pouf, swivel
-from ._office_spot import Spot, cell
 from ._office_storage import bins, lockers, row, shelves
+from ._spot import Spot
 
 DESKS = (  # near left corner, angle, how far the chair is out, how it is turned, its cloth
     (5.5, 0.75, np.pi, 0.26, 0.3, "tweed_grey"),

@@ -9,6 +9,7 @@ from ...common.errors import UserError
 from ._exact import exp, length, smoothed
 from ._types import RGB, Walk
 
+FRAMES_PER_S, TEST_FRAMES_PER_S = 10.0, 1.0  # that are taken of a path, as the paper does
 STEPS_PER_S = 60  # in which a path is steered; frames are taken from those
 LOOK_S, PLACE_S = 0.28, 0.3  # over which direction and place are smoothed
 JITTER_S = 0.5  # correlation time of a hand's jitter (Ornstein-Uhlenbeck)
@@ -104,7 +105,7 @@ def frames(walk: Walk, rate: float, count: int) -> Walk:
     return (slow if count <= len(slow) else walk).picked(count)
 
 
-def constant_speed(stations: Sequence[tuple[RGB, RGB]], count: int, rate: float = 10.0) -> Walk:
+def constant_speed(stations: Sequence[tuple[RGB, RGB]], count: int, rate: float = FRAMES_PER_S) -> Walk:
     """A closed path through (place, looked-at point) `stations`, at one speed of both together, `rate` frames a second.
 
     Periodic cubic splines, as a robot or a careful operator goes.

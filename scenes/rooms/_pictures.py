@@ -3,7 +3,7 @@
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from ._noise import byte_image, colour, hsv, mix, noise, whole
+from ._noise import byte_image, colour, hsv, mix, noise, tiled, whole
 
 SIZE = 256  # pixels of one picture; `art` is two rows of four
 PRIMARY = ((220, 40, 30), (30, 60, 160), (240, 200, 40), (240, 235, 220), (240, 235, 220), (20, 20, 20))
@@ -16,7 +16,7 @@ def art() -> np.ndarray:
     random = np.random.default_rng(31)
     rectangles, mosaic = _rectangles(random), _mosaic(random)
     pictures = [rectangles, mosaic, _hills(), _waves(), _sign(), _discs(random), _clock(), _contours()]
-    return byte_image(np.concatenate([np.concatenate(row, 1) for row in (pictures[:4], pictures[4:])]))
+    return byte_image(tiled(pictures, 4))
 
 
 def _grid() -> tuple[np.ndarray, np.ndarray]:

@@ -5,11 +5,12 @@ import math
 import numpy as np
 
 from . import _bedroom_bed, _bedroom_clothes, _bedroom_desk, _bedroom_shell
-from ._bedroom_materials import MATERIALS, textures
+from ._bedroom_materials import MATERIALS, TEXTURES
 from ._bedroom_paths import HUMAN, HUMAN_START, SMOOTH, TEST, TEST_START
 from ._bedroom_shell import WINDOW, X, Y, Z
 from ._builder import Builder
-from ._paths import at_rate, constant_speed, frames, steered
+from ._furnished import furnished
+from ._paths import steered
 from ._types import AreaLight, Room
 
 LOOK_S, JITTER = 1.0, 0.7
@@ -22,24 +23,9 @@ def build() -> Room:
     _bedroom_bed.add(room, random)
     _bedroom_desk.add(room, random)
     _bedroom_clothes.add(room, random)
-    meshes = room.meshes()
-    materials = {name: MATERIALS[name] for name in meshes}
     human = steered(HUMAN, HUMAN_START, seed=11, jitter=JITTER, look_s=LOOK_S)
     test = steered(TEST, TEST_START, seed=12, jitter=JITTER, look_s=LOOK_S)
-    return Room(
-        meshes=meshes,
-        materials=materials,
-        textures=textures(materials.values()),
-        lights=_lights(),
-        parts=tuple(room.parts),
-        inside=((0.0, 0.0, 0.0), (X, Y, Z)),
-        paths={
-            "human": lambda count: frames(human, 10, count),
-            "smooth": lambda count: constant_speed(SMOOTH, count),
-            "test": lambda count: frames(test, 1, count),
-        },
-        points_path=at_rate(human, 10),
-    )
+    return furnished(room, MATERIALS, TEXTURES, _lights(), (X, Y, Z), human, SMOOTH, test)
 
 
 def _lights() -> tuple[AreaLight, ...]:

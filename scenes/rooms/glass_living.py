@@ -6,12 +6,13 @@ import numpy as np
 
 from . import _glass_cases, _glass_seats, _glass_shell
 from ._builder import Builder
+from ._furnished import furnished
 from ._glass_cases import BAYS, CABINET
-from ._glass_materials import MATERIALS, textures
+from ._glass_materials import MATERIALS, TEXTURES
 from ._glass_paths import HUMAN, HUMAN_START, SMOOTH, TEST, TEST_START
 from ._glass_seats import TABLE
 from ._glass_shell import WINDOW, X, Y, Z
-from ._paths import at_rate, constant_speed, frames, steered
+from ._paths import steered
 from ._types import AreaLight, Room
 
 WARM, DUSK = (1.0, 0.87, 0.7), (1.0, 0.84, 0.76)
@@ -23,24 +24,9 @@ def build() -> Room:
     _glass_shell.add(room, random)
     _glass_seats.add(room, random)
     _glass_cases.add(room, random)
-    meshes = room.meshes()
-    materials = {name: MATERIALS[name] for name in meshes}
     human = steered(HUMAN, HUMAN_START, seed=31, jitter=0.7, look_s=1.0)
     test = steered(TEST, TEST_START, seed=32, jitter=0.6, look_s=1.1)
-    return Room(
-        meshes=meshes,
-        materials=materials,
-        textures=textures(materials.values()),
-        lights=_lights(),
-        parts=tuple(room.parts),
-        inside=((0.0, 0.0, 0.0), (X, Y, Z)),
-        paths={
-            "human": lambda count: frames(human, 10, count),
-            "smooth": lambda count: constant_speed(SMOOTH, count, rate=6.0),
-            "test": lambda count: frames(test, 1, count),
-        },
-        points_path=at_rate(human, 10),
-    )
+    return furnished(room, MATERIALS, TEXTURES, _lights(), (X, Y, Z), human, SMOOTH, test, smooth_rate=6.0)
 
 
 def _lights() -> tuple[AreaLight, ...]:

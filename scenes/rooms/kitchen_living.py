@@ -6,9 +6,10 @@ import numpy as np
 
 from . import _kitchen, _living
 from ._builder import Builder
+from ._furnished import furnished
 from ._furniture import any_colour
-from ._materials import MATERIALS, textures
-from ._paths import Go, Stay, at_rate, constant_speed, frames, steered
+from ._materials import MATERIALS
+from ._paths import Go, Stay, steered
 from ._types import AreaLight, Room
 
 X, Y, Z = 6.0, 4.0, 2.6
@@ -80,28 +81,13 @@ def build() -> Room:
     _lamps(room)
     _kitchen.add(room, random)
     _living.add(room, random)
-    meshes = room.meshes()
-    materials = {name: MATERIALS[name] for name in meshes}
     wide, high = WINDOW[1] - WINDOW[0], WINDOW[3] - WINDOW[2]
     middle = (X - 0.015, (WINDOW[0] + WINDOW[1]) / 2, (WINDOW[2] + WINDOW[3]) / 2)
     turned = (math.pi / 2, 0.0, math.pi / 2)
     daylight = AreaLight("window", middle, turned, (wide, high), 8.0 * 2.6 * math.pi, (0.86, 0.94, 1.0))
     human = steered(HUMAN, HUMAN_START, seed=1)
     test = steered(TEST, TEST_START, seed=2, jitter=0.8)
-    return Room(
-        meshes=meshes,
-        materials=materials,
-        textures=textures(materials.values()),
-        lights=(daylight,),
-        parts=tuple(room.parts),
-        inside=((0.0, 0.0, 0.0), (X, Y, Z)),
-        paths={
-            "human": lambda count: frames(human, 10, count),
-            "smooth": lambda count: constant_speed(SMOOTH, count),
-            "test": lambda count: frames(test, 1, count),
-        },
-        points_path=at_rate(human, 10),
-    )
+    return furnished(room, MATERIALS, {}, (daylight,), (X, Y, Z), human, SMOOTH, test)
 
 
 def _shell(room: Builder) -> None:

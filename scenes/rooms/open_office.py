@@ -4,9 +4,11 @@ import numpy as np
 
 from . import _office_meeting, _office_shell, _office_work
 from ._builder import Builder
-from ._office_materials import OFFICE_MATERIALS, office_textures
+from ._furnished import furnished
+from ._office_materials import MATERIALS, TEXTURES
 from ._office_paths import HUMAN, HUMAN_START, SMOOTH, TEST, TEST_START
-from ._paths import at_rate, constant_speed, frames, steered
+from ._office_shell import X, Y, Z, lights
+from ._paths import steered
 from ._types import Room
 
 LOOK_S = 1.2  # how slowly the hand turns
@@ -18,21 +20,6 @@ def build() -> Room:
     _office_shell.add(room, random)
     _office_work.add(room, random)
     _office_meeting.add(room, random)
-    meshes = room.meshes()
-    materials = {name: OFFICE_MATERIALS[name] for name in meshes}
     human = steered(HUMAN, HUMAN_START, seed=31, jitter=0.7, look_s=LOOK_S)
     test = steered(TEST, TEST_START, seed=32, jitter=0.6, look_s=LOOK_S)
-    return Room(
-        meshes=meshes,
-        materials=materials,
-        textures=office_textures(materials.values()),
-        lights=_office_shell.lights(),
-        parts=tuple(room.parts),
-        inside=((0.0, 0.0, 0.0), (_office_shell.X, _office_shell.Y, _office_shell.Z)),
-        paths={
-            "human": lambda count: frames(human, 10, count),
-            "smooth": lambda count: constant_speed(SMOOTH, count, 4.0),
-            "test": lambda count: frames(test, 1, count),
-        },
-        points_path=at_rate(human, 10),
-    )
+    return furnished(room, MATERIALS, TEXTURES, lights(), (X, Y, Z), human, SMOOTH, test, smooth_rate=4.0)

@@ -7,13 +7,6 @@ import numpy as np
 from ._builder import WHITE, Builder
 
 
-def cell(k: int, columns: int, rows: int) -> tuple[float, float, float, float]:
-    """The texture's part that the k-th of `columns` x `rows` pictures takes, for what stands upright."""
-    column, row = k % columns, k // columns % rows
-    left, top = column / columns, row / rows
-    return (left + 0.002, top + 1 / rows - 0.004, left + 1 / columns - 0.002, top + 0.004)
-
-
 class Spot:
     """Draws with `room` about (x, y, z), turned by `angle` from the world's axes; who uses the thing looks ahead."""
 
