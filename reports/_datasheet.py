@@ -11,12 +11,11 @@ from matplotlib.lines import Line2D
 
 from ..common.files import whole
 from ..scenes.images import load_images
-from ..scenes.rooms._pace import PERCENTILES, pace
+from ..scenes.rooms._pace import PERCENTILES, pace, spaced
 from ..scenes.types import Scene
 from . import _figures, _topview
 from ._tables import Entry, Table, write_csv
 
-LENGTH_S = 0.1  # between the places that a way's length is summed over, so that jitter adds nothing
 EXAMPLES = 6  # views of a capture that are shown, the last two of them test views
 SIZE = 1.5  # inches of one
 INLIERS = 0.99  # share of the points on each axis that a map has to show
@@ -84,12 +83,8 @@ def _near(capture: Capture) -> list[Entry]:
 
 
 def length(times: np.ndarray, positions: np.ndarray) -> float:
-    """Metres of a way of (N, 3) positions, from one to the next that is LENGTH_S later or more."""
-    kept = [0]
-    for i, time in enumerate(times):
-        if time - times[kept[-1]] >= LENGTH_S - 1e-6:
-            kept.append(i)
-    return float(np.linalg.norm(np.diff(positions[kept], axis=0), axis=1).sum())
+    """Metres of a way of (N, 3) positions, by steps as `pace` takes them, so that jitter adds nothing."""
+    return float(np.linalg.norm(np.diff(positions[spaced(times)], axis=0), axis=1).sum())
 
 
 def maps(captures: Sequence[Capture], out: Path) -> tuple[str, ...]:

@@ -91,7 +91,7 @@ def _psnr(study: Study, backend: str, scene: str, selector: str, ratio: float) -
 def _delta(group: str, scene: str, selector: str, item: Summary, base: Summary, ours: bool) -> Delta:
     error = None
     if item.std is not None and base.std is not None:
-        error = math.sqrt(item.std**2 / item.n + base.std**2 / base.n)
+        error = math.sqrt(item.variance_of_mean + base.variance_of_mean)
     return Delta(group, scene, selector, item.mean - base.mean, error, ours)
 
 

@@ -90,7 +90,7 @@ def over_rooms(
         if scene in rooms and (item := _findings.against(study, backend, scene, selector, baseline, tuple(ratios))):
             found.setdefault(rooms[scene], []).append(item.mean)
             sides = (over_ratios(study.find(backend, scene, name), ratios) for name in (selector, baseline))
-            variances.setdefault(rooms[scene], []).append(math.fsum(_of_mean(side) for side in sides))
+            variances.setdefault(rooms[scene], []).append(math.fsum(summary(side).variance_of_mean for side in sides))
             verdicts.append(item.verdict)
     if len(found) < LEAST:
         return None
@@ -100,9 +100,3 @@ def over_rooms(
     of_rooms = (math.fsum(values) / len(values) ** 2 for values in variances.values())
     by_seeds = math.sqrt(math.fsum(of_rooms)) / len(means)
     return OverRooms(means, over_samples(list(means.values()), by_seeds), (counts[0], counts[1], counts[2]))
-
-
-def _of_mean(values: Sequence[float]) -> float:
-    """Variance of the mean of so many seeds; 0 of a single one, which says nothing of it."""
-    found = summary(values)
-    return 0.0 if found.std is None else found.std**2 / found.n

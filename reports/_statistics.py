@@ -22,6 +22,11 @@ class Summary:
     std: float | None
     n: int
 
+    @property
+    def variance_of_mean(self) -> float:
+        """std² / n, the square of the mean's standard error; 0 of a single sample, which says nothing of it."""
+        return 0.0 if self.std is None else self.std**2 / self.n
+
 
 @dataclass(frozen=True)
 class Difference:
@@ -57,7 +62,7 @@ def difference(ours: Sequence[float], theirs: Sequence[float]) -> Difference:
     mean = a.mean - b.mean
     if a.std is None or b.std is None:
         return Difference(mean, None, None)
-    va, vb = a.std**2 / a.n, b.std**2 / b.n
+    va, vb = a.variance_of_mean, b.variance_of_mean
     if va + vb == 0:  # whatever repeated here repeated nothing
         return Difference(mean, None, None, "no spread")
     from scipy.special import stdtrit
@@ -76,7 +81,7 @@ def over_samples(values: Sequence[float], least: float = 0.0) -> Difference:
     found = summary(values)
     if found.std is None:
         return Difference(found.mean, None, None)
-    error = max(found.std / math.sqrt(found.n), least)
+    error = max(math.sqrt(found.variance_of_mean), least)
     if error == 0:
         return Difference(found.mean, None, None, "no spread")
     from scipy.special import stdtrit

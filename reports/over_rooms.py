@@ -22,22 +22,20 @@ SPREAD = 0.025  # between selectors at a ratio, of the axis
 
 def build(study: Study, out: Path) -> list[Item]:
     """A figure against every n-th frame and a table for each way of walking; nothing where all is in a single room."""
-    items = []
-    for walk, rooms in groups(study).items():
-        if walk == ALL:
-            items += [_figure(study, baseline, out) for baseline in _findings.BASELINES[:1]]
-        items.append(_table(study, walk, rooms, out))
+    found = groups(study)
+    items = [_figure(study, found, out), *(_table(study, walk, rooms, out) for walk, rooms in found.items())]
     return [item for item in items if item is not None]
 
 
-def _figure(study: Study, baseline: str, out: Path) -> Item | None:
-    """Mean difference to `baseline` over the ratio, a panel for each backend and way of walking."""
+def _figure(study: Study, walks: Mapping[str, Mapping[str, str]], out: Path) -> Item | None:
+    """Mean difference to every n-th frame over the ratio, a panel for each backend and way of walking."""
+    baseline = _findings.BASELINES[0]
     if baseline not in study.selectors:
         return None
     drawn = styles(name for name in study.selectors if name != baseline)
     panels, records = [], []
     for backend in study.backends:
-        for walk, rooms in groups(study).items():
+        for walk, rooms in walks.items():
             found = {
                 name: {
                     ratio: item
@@ -64,9 +62,8 @@ def _figure(study: Study, baseline: str, out: Path) -> Item | None:
     caption = (
         f"Difference of mean PSNR to {baseline} (the line at 0), the mean over rooms; above the line is better. Bars: "
         "the 95 % interval (Student's) of that mean with rooms as the sample; a single further room may differ by more "
-        "than twice as much; "
-        "small marks: each room's own difference, the mean of its seeds and walks. At a ratio the selectors stand side "
-        "by side so that their bars can be told apart."
+        "than twice as much; small marks: each room's own difference, the mean of its seeds and walks. At a ratio the "
+        "selectors stand side by side so that their bars can be told apart."
     )
     return Item("Differences over rooms", "figure", caption, files)
 

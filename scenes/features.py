@@ -55,7 +55,7 @@ def features(
     made_by = f"{name}: {module.version(argument)}; numpy {np.__version__}; {code}; {DECODING}"
     folder = Path(cache) / f"{name}-{hashlib.sha256(made_by.encode()).hexdigest()[:16]}"
     pictures = [content_hash(path) for path in split.paths]
-    brought = shipped_features.read(root, name, of_encoder(encoder)) if root is not None and not argument else {}
+    brought = {} if root is None or argument else shipped_features.read(root, name, lambda: of_encoder(encoder))
     files = [folder / f"{sha256}.npy" for sha256 in pictures]
     rows = [brought[sha256] if sha256 in brought else cached(folder / f"{sha256}.npy") for sha256 in pictures]
     missing = [i for i, row in enumerate(rows) if row is None]

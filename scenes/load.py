@@ -86,11 +86,11 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
         )
     folder = settings.folder_of(entry)
     if folder is None or not folder.exists() or entry.render:
-        from .whereabouts import absence, renderable  # no source: it says what is missing
+        from .whereabouts import absence  # no source: it says what is missing
 
-        if folder is not None and folder.exists() and not renderable([name], settings):
-            return folder
-        raise UserError(absence([name], settings) or f"scene '{name}' is not in '{folder}'")
+        said = absence([name], settings)
+        if said or folder is None or not folder.exists():
+            raise UserError(said or f"scene '{name}' is not in '{folder}'")
     return folder
 
 

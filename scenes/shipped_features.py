@@ -1,14 +1,14 @@
 """Features that a capture brings along, so that everyone chooses by the same numbers and nobody has to embed it."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..common.errors import UserError
-from ..common.files import read_json, sha256_file, whole, write_json, write_text
+from ..common.files import sha256_file, whole, write_json, write_text
 
 # Of a capture: NAME.npy has the rows, NAME.json says of which pictures and by what, NAME.sha256 ties them together, as
 # `sha256sum -c` reads it.
@@ -18,7 +18,7 @@ FOLDER = "features"
 def files(root: Path) -> tuple[Path, ...]:
     """What a capture's features are read from, in order; a folder of that name with anything else in it has none."""
     records = sorted((root / FOLDER).glob("*.json"))
-    return tuple(file for record in records if _is_record(record) for file in (record, record.with_suffix(".npy")))
+    return tuple(file for record in records if _record(record) for file in (record, record.with_suffix(".npy")))
 
 
 def write(root: Path, encoder: str, made_by: dict[str, Any], pictures: Sequence[str], rows: np.ndarray) -> Path:
@@ -33,17 +33,16 @@ def write(root: Path, encoder: str, made_by: dict[str, Any], pictures: Sequence[
     return file
 
 
-def read(root: Path, encoder: str, made_by: dict[str, Any]) -> dict[str, np.ndarray]:
+def read(root: Path, encoder: str, made_by: Callable[[], dict[str, Any]]) -> dict[str, np.ndarray]:
     """The (D,) float32 row of length 1 of each picture, by its SHA-256; empty where the capture brings none of these.
 
-    Rows made by another version of the encoder, or by other weights, are none of these. Raises UserError for files
-    that do not fit together.
+    Rows made by another version of the encoder, or by other weights, are none of these: `made_by` is asked for what
+    this one depends on, its weights' hash among it, where there are rows at all. Raises UserError for files that do
+    not fit together.
     """
     file = root / FOLDER / f"{encoder}.npy"
-    if not _is_record(file.with_suffix(".json")):
-        return {}
-    record = read_json(file.with_suffix(".json"), "features")
-    if any(record.get(key) != value for key, value in made_by.items()):
+    record = _record(file.with_suffix(".json"))
+    if record is None or any(record.get(key) != value for key, value in made_by().items()):
         return {}
     mend = "delete that folder, or bring it anew"
     try:
@@ -63,11 +62,12 @@ def _sums(file: Path) -> str:
     return "".join(f"{sha256_file(path)}  {path.name}\n" for path in (file.with_suffix(".json"), file))
 
 
-def _is_record(file: Path) -> bool:
-    """Whether it is ours: a capture may have a folder of this name for its own ends."""
+def _record(file: Path) -> dict[str, Any] | None:
+    """What the file says if it is ours: a capture may have a folder of this name for its own ends."""
     try:
         record = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
-        return False
+        return None
     pictures = record.get("pictures") if isinstance(record, dict) else None
-    return isinstance(pictures, list) and all(isinstance(one, str) for one in pictures) and "encoder" in record
+    ours = isinstance(pictures, list) and all(isinstance(one, str) for one in pictures) and "encoder" in record
+    return record if ours else None

@@ -15,15 +15,13 @@ def absence(names: Iterable[str], settings: Settings, study: bool = False) -> st
     in a `study` the scenes that it renders first.
     """
     undrawn = renderable(names := list(names), settings)
-    drawn_first = undrawn if study and renders(settings) else ()
-    known = {name: entry for name in names if name not in drawn_first and (entry := settings.entry(name)) is not None}
+    known = {name: entry for name in names if name not in undrawn and (entry := settings.entry(name)) is not None}
     folders = {name: settings.folder_of(entry) for name, entry in known.items()}
     unset = [name for name, folder in folders.items() if folder is None]
     absent = unset or [name for name, folder in folders.items() if folder is not None and not folder.exists()]
-    undrawn = [name for name in undrawn if name in known]
-    absent = [name for name in absent if name not in undrawn]
     sentences = [_absent(absent, folders, bool(unset), known)] if absent else []
-    return "; ".join([*sentences, *([_undrawn(undrawn)] if undrawn else [])]) or None
+    sentences += [_undrawn(undrawn)] if undrawn and not (study and renders(settings)) else []
+    return "; ".join(sentences) or None
 
 
 def _absent(absent: list[str], folders: dict[str, Path | None], unset: bool, known: dict[str, SceneEntry]) -> str:

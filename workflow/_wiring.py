@@ -21,6 +21,7 @@ from ..common.errors import UserError
 from ..common.files import sha256_file
 from ..common.settings import PACKAGE, Settings
 from ..reports._tracking import is_remote
+from ..scenes import seen
 from ..scenes.whereabouts import absence, python_of, renderable, renders
 from ..selectors import _run
 from ._depends import Lists
@@ -117,12 +118,6 @@ class Wiring:
             for stamp in (stamps / f"{scene}.txt", *(stamps / scene).glob("*")):
                 stamp.unlink(missing_ok=True)
 
-    def render_folder(self, wildcards: Any) -> str:
-        """Where a scene is rendered to."""
-        entry = self.settings.entry(wildcards.scene)
-        assert entry is not None
-        return str(self.settings.folder_of(entry))
-
     def render_command(self, wildcards: Any) -> str:
         """The command line that renders a scene, up to what says which frames."""
         entry = self.settings.entry(wildcards.scene)
@@ -132,7 +127,7 @@ class Wiring:
         except ValueError as error:
             raise WorkflowError(f"[scenes.{wildcards.scene}] render = '{entry.render}': {error}") from None
         words = [python_of(self.settings), "-m", "viewbench", "render", *asked]
-        return shlex.join([*words, "--out", self.render_folder(wildcards)])
+        return shlex.join([*words, "--out", str(self.settings.folder_of(entry))])
 
     def render_parts(self, wildcards: Any) -> list[str]:
         """What says that the parts of a scene are rendered: of its path, and of the test frames."""
@@ -148,7 +143,7 @@ class Wiring:
         """Hash of what a rendered scene says of its test views; empty where it says nothing."""
         entry = self.settings.entry(wildcards.scene)
         folder = self.settings.folder_of(entry) if entry else Path(wildcards.scene)
-        file = folder / "seen_test.json" if folder else None
+        file = folder / seen.FILE if folder else None
         return sha256_file(file) if file and file.is_file() else ""
 
     def dataset(self, wildcards: Any) -> str:

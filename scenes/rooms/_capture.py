@@ -13,6 +13,7 @@ from PIL import Image
 
 from ...common.errors import UserError
 from ...common.files import read_json, whole, write_json
+from ..seen import FILE
 from . import _points, _visibility
 from ._rendering import FIELD_OF_VIEW
 from ._types import Room
@@ -158,7 +159,7 @@ def _write_seen(out: Path, room: Room, shares: Callable[[Room, np.ndarray, np.nd
     files = [out / f"transforms_{split}.json" for split in ("test", "train")]
     if not all(file.is_file() for file in files):
         return
-    seen, test, train = out / _visibility.FILE, *(_frames(file) for file in files)
+    seen, test, train = out / FILE, *(_frames(file) for file in files)
     poses = [np.array([frame["transform_matrix"] for frame in frames]) for frames in (test, train)]
     of = {"room_sha256": digest(room), "poses_sha256": [_sha256(part) for part in poses]}
     if seen.is_file() and _visibility.is_of(read_json(seen, "shares"), of):

@@ -8,16 +8,22 @@ PERCENTILES = (5, 25, 50, 75, 95, 100)
 STEP_S = 0.1  # over which motion is taken: jitter at a motion capture's 100 Hz is its noise
 
 
+def spaced(times: np.ndarray) -> list[int]:
+    """Of (N,) rising seconds the first, and then each that is STEP_S or more after the one before."""
+    kept = [0]
+    for i, time in enumerate(times):
+        if time - times[kept[-1]] >= STEP_S - 1e-6:
+            kept.append(i)
+    return kept
+
+
 def pace(times: np.ndarray, c2w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Percentiles of speed in metres a second and of turn rate in degrees a second.
 
     (N,) rising seconds and (N, 4, 4) poses, of which those are taken that are STEP_S or more apart. NaN for fewer than
     two.
     """
-    kept = [0]
-    for i, time in enumerate(times):
-        if time - times[kept[-1]] >= STEP_S - 1e-6:
-            kept.append(i)
+    kept = spaced(times)
     times, c2w = times[kept], c2w[kept]
     if len(times) < 2:
         return np.full(len(PERCENTILES), np.nan), np.full(len(PERCENTILES), np.nan)

@@ -11,7 +11,6 @@ from ._types import Room
 
 SIDE = 24  # squared, the rays of a test view
 SLACK_M = 0.02  # how far before a place something may be that is taken for the place's own surface
-FILE = "seen_test.json"  # of a capture
 
 
 def seen_shares(room: Room, test: np.ndarray, train: np.ndarray, side: int = SIDE, tracer: Any = None) -> np.ndarray:

@@ -46,10 +46,10 @@ def _keys(table) -> list[str]:
 def _capture(name: str, settings: "Settings") -> "Capture":
     from ...reports._datasheet import Capture
     from ...scenes.load import open_scene
-    from .describe import seen_of
+    from ...scenes.seen import shares_of
 
     scene = open_scene(name, settings)
-    seen = seen_of(scene.root, scene.test.names) or ()
+    seen = shares_of(scene.root, scene.test.names) or ()
     entry = settings.entry(name)
     title = name if entry else scene.name
     return Capture(title, settings.room_of(name) if entry else "", settings.walk_of(name), scene, tuple(seen))

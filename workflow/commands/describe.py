@@ -20,6 +20,7 @@ def command(scene: _options.Capture, out: Path, width: int | None) -> None:
     from ...common import settings as settings_file
     from ...common.files import write_json
     from ...scenes.digest import scene_sha256
+    from ...scenes.seen import shares_of
     from ...scenes.types import Split
 
     settings = settings_file.load()
@@ -55,23 +56,9 @@ def command(scene: _options.Capture, out: Path, width: int | None) -> None:
         "train": split(opened.train),
         "test": split(opened.test),
         "points": points,
-        "seen": seen_of(opened.root, opened.test.names),
+        "seen": shares_of(opened.root, opened.test.names),
     }
     write_json(out, record)
-
-
-def seen_of(root: Path, names: tuple[str, ...]) -> list[float] | None:
-    """Of each test view the share of its pixels that training views see, where a rendered capture says so."""
-    from ...common.files import read_json
-
-    file = root / "seen_test.json"
-    if not file.is_file():
-        return None
-    record = read_json(file, "shares")
-    shares = record.get("seen") if isinstance(record, dict) else None
-    if not isinstance(shares, dict) or not all(isinstance(shares.get(name), float | int) for name in names):
-        return None
-    return [shares[name] for name in names]
 
 
 def _write_truth(test, width: int, folder: Path) -> None:
