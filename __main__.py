@@ -11,7 +11,11 @@ def main(arguments: list[str] | None = None) -> None:
     from .workflow import _fork_client
 
     status = _fork_client.run(sys.argv[1:]) if arguments is None else None
-    if status is None:
+    if status is None and arguments is None:
+        from .workflow import _again
+
+        status = _again.run(sys.argv[1:])
+    elif status is None:
         from .workflow.commands import _main
 
         status = _main.run(arguments)

@@ -19,7 +19,7 @@ from ..scenes.digest import scene_sha256
 from ..scenes.images import Picture, read_images
 from ..scenes.pictures import picture_name, save_png, to_uint8
 from ..scenes.types import Scene
-from . import _registry
+from . import _passing, _registry
 from ._metrics import lpips, lpips_sha256, lpips_weights, ssim
 from ._psnr import psnr_db
 
@@ -36,7 +36,8 @@ def evaluate(
 
     Scores are of the 8-bit pictures that are written, so that anyone can repeat them from the files.
     Raises UserError when the model is missing or was altered, was trained on another scene or on this one when it was
-    different (another hold-out may have trained on what is scored now), or the scene has no test split.
+    different (another hold-out may have trained on what is scored now), or the scene has no test split; PassingError
+    where memory was short.
     """
     train = read_json(model / "train.json", "training record")
     if not isinstance(train, dict) or not isinstance(train.get("files"), dict):
@@ -82,9 +83,10 @@ def evaluate(
     views: list[dict[str, Any]] = []
     try:
         drawn = zip(scene.test.names, truths, backend.render(model, cameras), strict=True)
-        for view in threads.over(scored, enumerate(drawn)):
-            views.append(view)
-            progress(len(views), len(scene.test), "")
+        with _passing.named(f"backend '{train['backend']}'", f"{len(indices)} views to render"):
+            for view in threads.over(scored, enumerate(drawn)):
+                views.append(view)
+                progress(len(views), len(scene.test), "")
         shutil.rmtree(renders, ignore_errors=True)
         temporary.replace(renders)
     finally:

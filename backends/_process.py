@@ -9,8 +9,9 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from ..common.errors import UserError
+from ..common.errors import PassingError, UserError
 from ._memory import Usage, watched
+from ._passing import passes
 
 KEPT = 4096  # bytes of a log's end in which its last line is looked for
 PR_SET_PDEATHSIG = 1  # of Linux' prctl: the signal that a process gets when its parent dies
@@ -21,7 +22,8 @@ def run(command: Sequence[str], folder: Path, log: Path, what: str, timeout_s: f
 
     The program leads a process group of its own, which is killed whole when the time is up or the caller is stopped,
     so that none of its children goes on with a model that nobody waits for. Raises UserError, with the program's last
-    line, when it is not found, ends with another status than 0, or takes longer than `timeout_s`.
+    line, when it is not found, ends with another status than 0, or takes longer than `timeout_s`; PassingError where it
+    says that memory was short, or the system killed it.
     """
     with open(log, "ab") as output:
         try:
@@ -49,17 +51,22 @@ def run(command: Sequence[str], folder: Path, log: Path, what: str, timeout_s: f
             _kill_group(process)
     if status != 0:
         ended = f"exit status {status}" if status > 0 else f"signal {signal.Signals(-status).name}"
-        raise UserError(f"{what} failed with {ended}: {last_line(log) or 'it printed nothing'}")
+        # Killed, and its caller is not: that is what the system does when the machine has no memory left.
+        kind = PassingError if status == -signal.SIGKILL or passes(_end(log)) else UserError
+        raise kind(f"{what} failed with {ended}: {last_line(log) or 'it printed nothing'}")
     return usage
 
 
 def last_line(log: Path) -> str:
     """The last line with something on it."""
+    lines = [line.strip() for line in _end(log).replace("\r", "\n").splitlines()]
+    return next((line for line in reversed(lines) if line), "")
+
+
+def _end(log: Path) -> str:
     with open(log, "rb") as file:
         file.seek(max(0, log.stat().st_size - KEPT))
-        text = file.read().decode("utf-8", "replace")
-    lines = [line.strip() for line in text.replace("\r", "\n").splitlines()]
-    return next((line for line in reversed(lines) if line), "")
+        return file.read().decode("utf-8", "replace")
 
 
 def _kill_group(process: subprocess.Popen) -> None:

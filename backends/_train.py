@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import __version__
 from ..common import plugins, threads
-from ..common.errors import UserError, nearest
+from ..common.errors import PassingError, UserError, nearest
 from ..common.files import read_json, sealed, sha256_folder, write_json
 from ..common.provenance import commit, machine
 from ..common.rng import seed_of
@@ -26,7 +26,7 @@ from ..scenes.images import read_images
 from ..scenes.lenses import pinholes
 from ..scenes.types import Cameras, Scene
 from ..selectors._selection import check_selection, selection_sha256
-from . import _registry
+from . import _passing, _registry
 from ._memory import peak_rss_bytes
 from ._pictures import KEPT_BYTES, Pictures
 from ._psnr import psnr_db
@@ -51,7 +51,7 @@ def train(
 
     The files of the model appear in `out` only when all of them are written, `train.json` last. Raises UserError for
     a backend that is unavailable or unknown, an option that it does not have, a selection that does not fit the
-    scene, and whatever the backend refuses.
+    scene, and whatever the backend refuses; PassingError where memory was short.
     """
     threads.allow(settings.compute.threads)
     backend = _registry.load(job.backend, settings)
@@ -97,13 +97,13 @@ def train(
                 chosen=indices,
                 training=pinholes(scene.train.cameras if job.width is None else scene.train.cameras.scaled(job.width)),
             )
-            trained = backend.train(data, work / "model", cell_seed, job.budget, options, report)
-    except (UserError, MemoryError) as error:
+            with _passing.named(f"backend '{job.backend}'", f"{len(indices)} views"):
+                trained = backend.train(data, work / "model", cell_seed, job.budget, options, report)
+    except UserError as error:
         for log in (work / "model").glob("*.log"):
             log.replace(out / log.name)  # what an external program said outlives its failure
-        shutil.rmtree(work, ignore_errors=True)
-        if isinstance(error, MemoryError):
-            raise UserError(f"backend '{job.backend}' ran out of memory with {len(indices)} views") from None
+        if not (backend.CAPABILITIES.resumes and isinstance(error, PassingError)):  # else the next attempt goes on
+            shutil.rmtree(work, ignore_errors=True)
         raise
     taken = next((file.name for file in (work / "model").iterdir() if file.name in OURS), None)
     if taken is not None:

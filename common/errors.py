@@ -11,6 +11,13 @@ class UserError(Exception):
         super().__init__(" ".join(str(message).split()))
 
 
+class PassingError(UserError):
+    """What the machine refused for now (memory that another program has, a device that is busy) and may give later.
+
+    A command that ends with it is run again some times (workflow/_again.py).
+    """
+
+
 def nearest(word: str, known) -> str:
     """`; did you mean 'x'?` for the known word nearest to `word`, or an empty string."""
     import difflib

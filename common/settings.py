@@ -52,6 +52,8 @@ class Features:
 class Compute:
     threads: int = 1
     device: str = "auto"
+    retries: int = 2  # of a training or a score that the machine had no memory for
+    retry_wait: int = 15  # seconds before the first of them, twice as long before each other
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,7 @@ SECTIONS: dict[str, type] = {
     "tracking": Tracking,
     "instant_ngp": InstantNgp,
 }
-MAY_BE_ZERO = ("renders", "timeout", "model")  # no renders, no limit, the first model
+MAY_BE_ZERO = ("renders", "timeout", "model", "retries", "retry_wait")  # no renders, no limit, the first model, none
 TABLES: dict[str, type] = {"scenes": SceneEntry, "command": Command}
 
 

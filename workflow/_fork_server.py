@@ -154,9 +154,9 @@ def run(request: dict[str, Any], fds: list[int]) -> NoReturn:
         os.environ.pop(PREFIX, None)
         sys.argv = ["viewbench", *request["arguments"]]
         importlib.invalidate_caches()
-        from .commands import _main
+        from . import _again
 
-        status = _main.run(request["arguments"])
+        status = _again.run(request["arguments"])
     except SystemExit as error:
         status = error.code if isinstance(error.code, int) else int(error.code is not None)
     except BaseException:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from ...common.errors import UserError
+from ...common.errors import PassingError
 from .. import _snapshot
 from .._gaussian_ply import Gaussians
 from .._points import Start
@@ -51,7 +51,7 @@ def fit(task: Task, starts: list[Start], device: str, rasterize: Callable) -> tu
     """Trains from the points; returns Gaussians, near plane in scene units and fields of `Trained`.
 
     A run limited by seconds alone follows the schedule of 30,000 steps as far as it gets.
-    Raises UserError when the device's memory is full.
+    Raises PassingError when the device's memory is full.
     """
     torch.manual_seed(task.seed)
     # SSIM's variances are differences of nearly equal numbers, of which TF32's 10 bits leave nothing.
@@ -62,7 +62,7 @@ def fit(task: Task, starts: list[Start], device: str, rasterize: Callable) -> tu
     try:
         state = _run(task, params, extent, renderer)
     except torch.cuda.OutOfMemoryError:
-        raise UserError(
+        raise PassingError(
             f"the GPU's memory is full with {len(params['means'])} Gaussians and {len(data.names)} views of "
             f"{data.cameras.width[0]} pixels width; train at a smaller width, or set gaussians to fewer"
         ) from None

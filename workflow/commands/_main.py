@@ -9,7 +9,8 @@ import click
 
 from ... import __version__
 from ...common import extras, plugins
-from ...common.errors import UserError
+from ...common.errors import PassingError, UserError
+from .._again import PASSING
 
 PACKAGE = "workflow.commands"
 
@@ -43,11 +44,16 @@ def group() -> None:
 
 
 def run(arguments: list[str] | None = None) -> int:
-    """Runs one command and returns the exit status: 0 or the command's, 2 for a user's mistake, 130 when stopped."""
+    """Runs one command and returns the exit status.
+
+    That is 0 or the command's, 2 for a user's mistake, 75 for what may work another time, 130 when stopped.
+    """
     signal.signal(signal.SIGTERM, _stop)  # so that temporary files are removed on the way out
     try:
         status = group.main(arguments, prog_name="viewbench", standalone_mode=False)
         sys.stdout.flush()
+    except PassingError as error:
+        return _fail(str(error), PASSING)
     except UserError as error:
         return _fail(str(error))
     except click.ClickException as error:
@@ -70,9 +76,9 @@ def run(arguments: list[str] | None = None) -> int:
     return status or 0
 
 
-def _fail(message: str) -> int:
+def _fail(message: str, status: int = 2) -> int:
     print(f"viewbench: {message}", file=sys.stderr)
-    return 2
+    return status
 
 
 def _stop(number: int, frame: object) -> None:
