@@ -120,3 +120,9 @@ class _Known(dict):
 
     def __missing__(self, key: str) -> str:
         return "…"
+
+
+def clock(seconds: float) -> str:
+    """Minutes and seconds, or hours and minutes of what takes long."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02d} h" if minutes >= 100 else f"{minutes}:{rest:02d} min"

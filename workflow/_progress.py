@@ -5,6 +5,7 @@ of ours counts the jobs instead (`_pace.py`). The line is drawn from the moment 
 every second, so that it moves also where no job ends; nothing that goes wrong with it reaches the run.
 """
 
+import atexit
 import contextlib
 import logging
 import shutil
@@ -15,7 +16,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ._pace import Pace
+from ._pace import Pace, clock
+from ._run_file import EVERY_S, RunFile
 
 TICK_S = 1.0  # between two drawings on a terminal
 LINE_S = 20.0  # between two lines elsewhere
@@ -36,6 +38,8 @@ class Progress(logging.Handler):
         self.last_line = -1e9
         self.width = 0  # of what stands on the terminal's line
         self.over = threading.Event()
+        self.folder: Path | None = None  # results/STUDY, of a real run
+        self.file: RunFile | None = None  # what `viewbench status` reads, once the folder is this run's alone
 
     def start(self) -> None:
         """Draws the first line, and one every second from now on, in a thread that ends with the run."""
@@ -51,6 +55,7 @@ class Progress(logging.Handler):
         with contextlib.suppress(Exception), self._alone():
             if not self.over.is_set():
                 self._show()
+                self._tell()
 
     def says(self, phase: str, cells: int | None = None) -> None:
         """What is being done before the jobs, and the number of cells when that is known."""
@@ -66,10 +71,18 @@ class Progress(logging.Handler):
         if event == "RUN_INFO":
             self.pace.plan(getattr(record, "stats", None) or {})
             self.phase = "starting"
+            if self.folder and not self.file:
+                self.file = RunFile(self.folder)
+                atexit.register(self.ends, "stopped")
             self._show(at_once=True)
+            self._tell(at_once=True)
         elif event == "JOB_INFO":
             job = vars(record)
             self.pace.begin(job["jobid"], job["rule_name"], dict(job.get("wildcards") or {}))
+            output = _listed(record, "output")
+            self.failures.discard(output)  # tried again, as a cluster's jobs are
+            if self.file:
+                self.file.failed.pop(output, None)
         elif event == "JOB_FINISHED":
             rule = self.pace.end(getattr(record, "job_id", -1))
             self.phase = "looking for what is next"
@@ -77,14 +90,33 @@ class Progress(logging.Handler):
         elif event == "JOB_ERROR":
             self._fail(record)
 
+    def _tell(self, at_once: bool = False) -> None:
+        """Writes the run's file; a second here or there does not matter to who reads it."""
+        if self.file:
+            at_once = at_once or (bool(self.pace.running) and time.time() - self.file.wrote > EVERY_S)
+            left = self.pace.seconds_left if self.cells is None or self.done < self.cells else None
+            self.file.write(self.pace, left, self.pace.doing() or self.phase, at_once)
+
+    def ends(self, how: str) -> None:
+        """The run is "finished", or has "failed" or "stopped", whichever is said first."""
+        with contextlib.suppress(Exception), self._alone():
+            if self.file and not self.file.ended:
+                self.file.ended = how
+                self._tell(at_once=True)
+
     def _fail(self, record: logging.LogRecord) -> None:
+        ended = self.pace.running.get(getattr(record, "jobid", -1))
         self.pace.end(getattr(record, "jobid", -1), failed=True)
         rule = getattr(record, "rule_name", "?")
-        words = last_line(list(getattr(record, "log", []) or []))
-        output = ", ".join(getattr(record, "output", []) or [])
+        logs = list(getattr(record, "log", []) or [])
+        words = last_line(logs)
+        output = _listed(record, "output")
         if output in self.failures:
             return
         self.failures.add(output)
+        if self.file:
+            self.file.fail(output, rule, ended.wildcards if ended else {}, words, str(logs[-1]) if logs else "")
+            self._tell(at_once=True)
         self._clear()
         print(f"failed: {rule} of {output}: {words or 'see its log'}", file=self.stream, flush=True)
 
@@ -95,7 +127,7 @@ class Progress(logging.Handler):
 
     def text(self) -> str:
         """The line: cells, failures, elapsed time, time left, and what runs."""
-        so_far = f"{_clock(self.clock() - self.began)} so far"
+        so_far = f"{clock(self.clock() - self.began)} so far"
         if self.cells is None or not self.pace.planned:
             return f"{self.phase}, {so_far}"
         parts = [f"{self.done} of {self.cells} cells"]
@@ -104,7 +136,7 @@ class Progress(logging.Handler):
         parts.append(so_far)
         left = self.pace.seconds_left if self.done < self.cells else None
         if left is not None:
-            parts.append(f"about {_clock(left)} left")
+            parts.append(f"about {clock(left)} left")
         return f"{', '.join(parts)}; {self.pace.doing() or self.phase}"
 
     def _show(self, at_once: bool = False, final: bool = False) -> None:
@@ -168,6 +200,7 @@ def attach(workflow: Any, study: str) -> Progress:
         if handler.name == "DefaultStreamHandler":
             handler.addFilter(progress.passes)
     logger.addHandler(progress)
+    progress.folder = Path("results") / study
     progress.start()
     return progress
 
@@ -198,6 +231,10 @@ def salvage(study: Any, given: str) -> None:
         subprocess.run([sys.executable, "-m", "viewbench", *arguments], check=False)
 
 
+def _listed(record: logging.LogRecord, what: str) -> str:
+    return ", ".join(getattr(record, what, []) or [])
+
+
 def last_line(logs: list[str]) -> str:
     """Last line of the last of the logs that has one."""
     for log in reversed(logs):
@@ -207,8 +244,3 @@ def last_line(logs: list[str]) -> str:
             if lines:
                 return lines[-1]
     return ""
-
-
-def _clock(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes // 60}:{minutes % 60:02d} h" if minutes >= 100 else f"{minutes}:{rest:02d} min"

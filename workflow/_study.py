@@ -19,6 +19,7 @@ from ..selectors._types import FACTORS
 FOLDER = Path(__file__).resolve().parent
 STUDIES = FOLDER / "studies"
 REFERENCE = "full"
+TIERS = (0.25, 0.5, 1.0)  # a greedy order is made up to the next of these ratios, whichever of them a study asks for
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,10 @@ class SelectorEntry:
     def choice_seed(self, seed: int) -> int:
         """Seed of the choice in the cells with this seed: one choice serves all of them where it has no randomness."""
         return seed if self.seeded else 0
+
+    def choice_part(self, ratio: float) -> float:
+        """Ratio of the choice in the cells with this ratio: a greedy order serves all up to the next tier."""
+        return next(tier for tier in TIERS if ratio <= tier) if self.greedy else ratio
 
     @property
     def needs_features(self) -> bool:

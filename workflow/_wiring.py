@@ -31,7 +31,6 @@ from ._study import Study
 CHOOSING = ("numpy", "scipy", "numba")
 READING = ("numpy", "scipy", "pillow")  # and drawing to a smaller size
 SCORING = ("numpy", "scipy", "scikit-image", "pillow", "lpips", "torch")
-TIERS = (0.25, 0.5, 1.0)  # a greedy order is made up to the next of these ratios, whichever of them a study asks for
 
 
 @contextlib.contextmanager
@@ -212,9 +211,7 @@ class Wiring:
         """The file with a cell's choice: one for all ratios of a tier where the order is greedy, one for all backends
         and, where the selector has no randomness, for all seeds."""
         entry = self.study.selector(wildcards.selector)
-        ratio = float(wildcards.ratio)
-        seed = entry.choice_seed(int(wildcards.seed))
-        part = next(tier for tier in TIERS if ratio <= tier) if entry.greedy else ratio
+        part, seed = entry.choice_part(float(wildcards.ratio)), entry.choice_seed(int(wildcards.seed))
         return f"{self.results}/selections/{wildcards.scene}/{wildcards.selector}/{part!r}/{seed}.json"
 
     def selection_patterns(self) -> list[str]:

@@ -1,0 +1,176 @@
+"""What a run tells of itself while it goes, in results/STUDY/run.json, and whether that run is still there."""
+
+import contextlib
+import os
+import socket
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..common.errors import UserError
+from ..common.files import read_json, write_json
+
+FILE = "run.json"
+EVERY_S = 2.0  # between two writings where something happens
+SILENT_S = 20.0  # and where nothing does
+GONE_S = 120.0  # a run on another machine that has been silent for so long is gone
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job that runs or has failed."""
+
+    rule: str
+    wildcards: Mapping[str, str]
+    since: float  # time it began, or failed; seconds since 1970
+    words: str = ""  # last line of its log, of one that failed
+    log: str = ""
+
+    def of(self, cell: Mapping[str, str], study: Any) -> bool:
+        """Whether the cell of the `study` needs this job."""
+        given = self.wildcards
+        if self.rule in ("select", "features", "warm_selector", "warm"):
+            entry = study.selector(cell["selector"])
+            needed = {
+                "features": study.gives_features(entry),
+                "warm_selector": given.get("plugin") == entry.selector,
+                "warm": given.get("trainer") == study.backend(cell["backend"]).backend.replace(":", "-"),
+            }
+            if not needed.get(self.rule, True):
+                return False
+            if self.rule == "select":
+                part, seed = repr(entry.choice_part(float(cell["ratio"]))), str(entry.choice_seed(int(cell["seed"])))
+                if (given.get("part"), given.get("seed")) != (part, seed):
+                    return False
+        elif self.rule not in ("train", "evaluate", "track_cell", "describe", "render", "rendered"):
+            return False
+        axes = ("scene", "selector") if self.rule == "select" else tuple(cell)
+        return all(given[axis] == cell[axis] for axis in axes if axis in given)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run said last."""
+
+    pid: int
+    host: str
+    began: float  # seconds since 1970
+    said: float
+    ended: str  # "" while it goes; "finished", "failed", "stopped"
+    seconds_left: float | None
+    doing: str
+    running: tuple[Job, ...]
+    failed: tuple[Job, ...]
+    boot: str = ""
+    started: str = ""
+
+    @property
+    def alive(self) -> bool:
+        """Whether it goes on: by its process where that is on this machine, else by when it was heard of last."""
+        if self.ended:
+            return False
+        if self.host == socket.gethostname() and self.boot == _boot():
+            return _started(self.pid) == self.started
+        return time.time() - self.said < GONE_S
+
+
+class RunFile:
+    """Writes the file of one run, whole each time, and not more often than anybody reads it."""
+
+    def __init__(self, folder: Path):
+        self.file = folder / FILE
+        self.began, self.wrote = time.time(), 0.0
+        self.failed: dict[str, dict[str, Any]] = {}  # by what the jobs were to make
+        self.ended = ""
+
+    def write(self, pace: Any, seconds_left: float | None, doing: str, at_once: bool = False) -> None:
+        """Writes what is so now. A disk that does not take it costs the run nothing."""
+        now, clock = time.time(), pace.clock()
+        if not at_once and now - self.wrote < SILENT_S:
+            return
+        running = [
+            {"rule": job.rule, "wildcards": dict(job.wildcards), "since": now - (clock - job.began)}
+            for job in list(pace.running.values())
+        ]
+        record = {
+            "schema": 1,
+            "pid": os.getpid(),
+            "host": socket.gethostname(),
+            "boot": _boot(),
+            "started": _started(os.getpid()),
+            "began": self.began,
+            "said": now,
+            "ended": self.ended,
+            "seconds_left": seconds_left,
+            "doing": doing,
+            "running": [] if self.ended else running,
+            "failed": list(self.failed.values()),
+        }
+        self.wrote = now
+        with contextlib.suppress(OSError):
+            write_json(self.file, record)
+
+    def fail(self, output: str, rule: str, wildcards: Mapping[str, str], words: str, log: str) -> None:
+        self.failed[output] = {
+            "rule": rule,
+            "wildcards": dict(wildcards),
+            "since": time.time(),
+            "words": words,
+            "log": log,
+        }
+
+
+def read(folder: Path) -> Run | None:
+    """What the last run of the study in results/STUDY said; None where there was none that can be read."""
+    try:
+        record = read_json(folder / FILE, "record of a run")
+        jobs = {
+            key: tuple(
+                Job(
+                    str(job["rule"]),
+                    {str(name): str(value) for name, value in job["wildcards"].items()},
+                    float(job["since"]),
+                    str(job.get("words", "")),
+                    str(job.get("log", "")),
+                )
+                for job in record[key]
+            )
+            for key in ("running", "failed")
+        }
+        left = record["seconds_left"]
+        return Run(
+            pid=int(record["pid"]),
+            host=str(record["host"]),
+            began=float(record["began"]),
+            said=float(record["said"]),
+            ended=str(record["ended"]),
+            seconds_left=None if left is None else float(left),
+            doing=str(record["doing"]),
+            boot=str(record["boot"]),
+            started=str(record["started"]),
+            **jobs,
+        )
+    except (UserError, KeyError, TypeError, ValueError, AttributeError):
+        return None
+
+
+def _boot() -> str:
+    """Which start of this machine it is: numbers of processes begin anew with each."""
+    with contextlib.suppress(OSError):
+        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    return ""
+
+
+def _started(pid: int) -> str:
+    """When the process began, in ticks since the machine did; "" where it is not there, or no /proc is."""
+    with contextlib.suppress(OSError, IndexError, ValueError):
+        # The name of the program, in parentheses, may have spaces; the 22nd field is the 20th after it (proc(5)).
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+        return "" if fields[0] == "Z" else fields[19]
+    if not Path("/proc/self/stat").exists():
+        with contextlib.suppress(OSError):
+            os.kill(pid, 0)
+            return "there"
+    return ""
