@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels datasheet format clean clean-results
+.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock datasheet format clean clean-results
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -24,6 +24,7 @@ help:
 	@echo "make memory      peak memory of choosing, training and scoring by number of frames, up to 3,000 (20 minutes)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make wheels      the package and, apart from it, the rendered rooms; make datasheet describes them"
+	@echo "make lock        requirements.lock and requirements-select.lock, after a change of what is needed"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
 
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -100,6 +101,16 @@ external: dev
 wheels: dev
 	$(BIN)/python -m build --wheel --outdir dist .
 	$(BIN)/python -m build --wheel --outdir dist scenes/rendered
+
+# Programs for those who change the dependencies, apart from what viewbench itself is tested with.
+build/tools/.installed:
+	@$(PYTHON) -m venv build/tools
+	@build/tools/bin/python -m pip install -qq --disable-pip-version-check uv==0.13.9 pip-audit==2.10.1
+	@touch $@
+
+# The lock files, after a change of pyproject.toml or constraints.txt.
+lock: dev build/tools/.installed
+	$(BIN)/python -m tests.lock build/tools/bin/uv
 
 # The tables and pictures of scenes/rendered/README.md.
 datasheet: dev
