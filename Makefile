@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock datasheet format clean clean-results
+.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit datasheet format clean clean-results
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -25,6 +25,7 @@ help:
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make wheels      the package and, apart from it, the rendered rooms; make datasheet describes them"
 	@echo "make lock        requirements.lock and requirements-select.lock, after a change of what is needed"
+	@echo "make audit       known vulnerabilities of what the lock files name (asks PyPI; or ADVISORIES=FOLDER)"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
 
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -111,6 +112,11 @@ build/tools/.installed:
 # The lock files, after a change of pyproject.toml or constraints.txt.
 lock: dev build/tools/.installed
 	$(BIN)/python -m tests.lock build/tools/bin/uv
+
+# Known vulnerabilities of what the lock files name: pip-audit asks a service, or ADVISORIES= names a clone of
+# pypa/advisory-database.
+audit: dev build/tools/.installed
+	$(BIN)/python -m tests.audit --pip-audit build/tools/bin/pip-audit $(if $(ADVISORIES),--advisories $(ADVISORIES))
 
 # The tables and pictures of scenes/rendered/README.md.
 datasheet: dev

@@ -15,9 +15,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.large import GAUSSIANS, MIB, bound_bytes, capture, peak_bytes  # noqa: E402
-
-from viewbench.backends import splat  # noqa: E402
+from tests.large import GAUSSIANS, MIB, bound_bytes, capture, peak_bytes
+from viewbench.backends import splat
 
 DISTINCT, STEPS = 8, 20
 
