@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit datasheet format clean clean-results
+.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -26,6 +26,7 @@ help:
 	@echo "make wheels      the package and, apart from it, the rendered rooms; make datasheet describes them"
 	@echo "make lock        requirements.lock and requirements-select.lock, after a change of what is needed"
 	@echo "make audit       known vulnerabilities of what the lock files name (asks PyPI; or ADVISORIES=FOLDER)"
+	@echo "make versions    Python 3.11 to 3.13, each with the least, the pinned and the newest packages (an hour)"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
 
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -112,6 +113,9 @@ build/tools/.installed:
 # The lock files, after a change of pyproject.toml or constraints.txt.
 lock: dev build/tools/.installed
 	$(BIN)/python -m tests.lock build/tools/bin/uv
+
+versions: dev build/tools/.installed
+	$(BIN)/python -m tests.versions --uv build/tools/bin/uv $(VERSIONS)
 
 # Known vulnerabilities of what the lock files name: pip-audit asks a service, or ADVISORIES= names a clone of
 # pypa/advisory-database.
