@@ -21,7 +21,7 @@ help:
 	@echo "make gpu         what needs a GPU, tried and recorded (10 minutes; GPU=--real for a capture too)"
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
 	@echo "make size        seconds to 25 dB by size of the pictures, memory by number of views (10 minutes)"
-	@echo "make memory      peak memory of choosing, training and scoring by number of frames, up to 3,000 (20 minutes)"
+	@echo "make memory      peak memory of choosing, training and scoring by number of frames, up to 3,000 (10 minutes)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make wheels      the package and, apart from it, the rendered rooms; make datasheet describes them"
 	@echo "make lock        requirements.lock and requirements-select.lock, after a change of what is needed"
