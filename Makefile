@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test lint types pytest bench gpu quality size external wheels datasheet format clean clean-results
+.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -21,8 +21,12 @@ help:
 	@echo "make gpu         what needs a GPU, tried and recorded (10 minutes; GPU=--real for a capture too)"
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
 	@echo "make size        seconds to 25 dB by size of the pictures, memory by number of views (10 minutes)"
+	@echo "make memory      peak memory of choosing, training and scoring by number of frames, up to 3,000 (10 minutes)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make wheels      the package and, apart from it, the rendered rooms; make datasheet describes them"
+	@echo "make lock        requirements.lock and requirements-select.lock, after a change of what is needed"
+	@echo "make audit       known vulnerabilities of what the lock files name (asks PyPI; or ADVISORIES=FOLDER)"
+	@echo "make versions    Python 3.11 to 3.13, each with the least, the pinned and the newest packages (an hour)"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
 
 $(VENV)/.installed: pyproject.toml constraints.txt
@@ -33,9 +37,12 @@ $(VENV)/.installed: pyproject.toml constraints.txt
 	@$(BIN)/viewbench --version
 	@touch $@
 
+# nerfstudio's code is read by tests alone, without most of what it needs, which would break `pip check`: it has a
+# folder of its own (tests/nerfstudio_code.py).
 $(VENV)/.installed-dev: $(VENV)/.installed
 	@$(PIP) -e '.[dev]'
-	@$(PIP) --no-deps nerfstudio==1.1.5
+	@$(BIN)/python -m pip uninstall -qq -y nerfstudio 2> /dev/null
+	@$(PIP) --no-deps --upgrade --target $(VENV)/nerfstudio nerfstudio==1.1.5
 	@$(BIN)/python -c 'import pytest, ruff, pyright, hypothesis'
 	@touch $@
 
@@ -49,7 +56,11 @@ reports: setup
 dashboard: setup
 	$(BIN)/mlflow server --backend-store-uri sqlite:///results/mlflow.db --host 127.0.0.1 --port 5000
 
-test: dev lint types pytest
+test: dev packages lint types pytest
+
+# Every installed package has what it needs, in a version that it takes.
+packages: dev
+	$(BIN)/python -m pip check
 
 lint: dev
 	$(BIN)/ruff check
@@ -80,6 +91,9 @@ quality: dev
 size: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_size.py $(BENCH)
 
+memory: dev
+	$(THREADS) $(BIN)/python tests/bench/bench_memory.py $(BENCH)
+
 # A program that is not ours behind `command:`; its environment is kept in build/external.
 external: dev
 	$(THREADS) $(BIN)/python -m tests.external_trainer build/external
@@ -89,6 +103,24 @@ external: dev
 wheels: dev
 	$(BIN)/python -m build --wheel --outdir dist .
 	$(BIN)/python -m build --wheel --outdir dist scenes/rendered
+
+# Programs for those who change the dependencies, apart from what viewbench itself is tested with.
+build/tools/.installed:
+	@$(PYTHON) -m venv build/tools
+	@build/tools/bin/python -m pip install -qq --disable-pip-version-check uv==0.13.9 pip-audit==2.10.1
+	@touch $@
+
+# The lock files, after a change of pyproject.toml or constraints.txt.
+lock: dev build/tools/.installed
+	$(BIN)/python -m tests.lock build/tools/bin/uv
+
+versions: dev build/tools/.installed
+	$(BIN)/python -m tests.versions --uv build/tools/bin/uv $(VERSIONS)
+
+# Known vulnerabilities of what the lock files name: pip-audit asks a service, or ADVISORIES= names a clone of
+# pypa/advisory-database.
+audit: dev build/tools/.installed
+	$(BIN)/python -m tests.audit --pip-audit build/tools/bin/pip-audit $(if $(ADVISORIES),--advisories $(ADVISORIES))
 
 # The tables and pictures of scenes/rendered/README.md.
 datasheet: dev

@@ -58,16 +58,24 @@ def features(
     brought = {} if root is None or argument else shipped_features.read(root, name, lambda: of_encoder(encoder))
     files = [folder / f"{sha256}.npy" for sha256 in pictures]
     rows = [brought[sha256] if sha256 in brought else cached(folder / f"{sha256}.npy") for sha256 in pictures]
-    missing = [i for i, row in enumerate(rows) if row is None]
-    if missing:
+    same: dict[str, list[int]] = {}  # frames of one picture, which is embedded once
+    for i, row in enumerate(rows):
+        if row is None:
+            same.setdefault(pictures[i], []).append(i)
+    if same:
         size, encode = module.encoder(argument, device)
+        missing = list(same.values())
+        done = len(split) - sum(map(len, missing))
         for start in range(0, len(missing), batch):
             part = missing[start : start + batch]
-            seen = np.stack([picture(split.paths[i], size) for i in part])
-            for i, row in zip(part, encode(seen), strict=True):
-                rows[i] = row = (row / np.linalg.norm(row)).astype(np.float32)
-                save(files[i], row)
-            progress(len(split) - len(missing) + start + len(part), len(split), "")
+            seen = np.stack([picture(split.paths[frames[0]], size) for frames in part])
+            for frames, row in zip(part, encode(seen), strict=True):
+                unit = (row / np.linalg.norm(row)).astype(np.float32)
+                save(files[frames[0]], unit)
+                for i in frames:
+                    rows[i] = unit
+            done += sum(map(len, part))
+            progress(done, len(split), "")
     return np.stack([row for row in rows if row is not None])
 
 

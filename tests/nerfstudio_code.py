@@ -5,6 +5,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 from unittest.mock import MagicMock
@@ -13,6 +14,8 @@ import pytest
 
 from viewbench.common.torchvision_cpu import import_torchvision
 
+# Where `make dev` puts it: among the other packages, most of what it needs would be missing.
+FOLDER = Path(sys.prefix) / "nerfstudio"
 READING = ("cv2", "viser", "viser.transforms", "appdirs", "newrawpy", "torch.utils.tensorboard")
 CONFIGURING = (
     *READING,
@@ -43,6 +46,16 @@ def methods() -> Iterator[dict[str, Any]]:
 @contextmanager
 def _without(unused: tuple[str, ...], never: tuple[str, ...] = ()) -> Iterator[None]:
     """What nerfstudio imports and does not use here is stood in for: `unused` where it is missing, `never` always."""
+    sys.path.append(str(FOLDER))
+    try:
+        with _stood_in(unused, never):
+            yield
+    finally:
+        sys.path.remove(str(FOLDER))
+
+
+@contextmanager
+def _stood_in(unused: tuple[str, ...], never: tuple[str, ...]) -> Iterator[None]:
     pytest.importorskip("nerfstudio", reason="nerfstudio is not installed (make dev installs its code alone)")
     stood_in = [*never, *(module for module in unused if not _importable(module))]
     for module in stood_in:

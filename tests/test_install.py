@@ -68,7 +68,7 @@ class Place:
 
 @pytest.fixture(scope="session")
 def light(once, wheel) -> Place:
-    """`pip install viewbench`, and nothing else."""
+    """`pip install viewbench` and nothing else, what it needs by its lock file."""
 
     def install(folder: Path) -> None:
         place = Place(folder)
@@ -76,7 +76,9 @@ def light(once, wheel) -> Place:
         reached = place.call("python", "-m", "pip", "download", "-qq", "--no-deps", "--dest", "tried", "click")
         if reached.returncode:
             pytest.skip("no package index is in reach")
-        place.pip("install", "-c", PACKAGE / "constraints.txt", wheel)
+        place.pip("install", "--require-hashes", "-r", PACKAGE / "requirements-select.lock")
+        place.pip("install", "--no-deps", wheel)
+        place.pip("check")
 
     return Place(once("light", install))
 

@@ -54,14 +54,17 @@ def depth_maps(data: TrainingSet, depths: tuple[float, float], rng: np.random.Ge
     """
     k, height, width, _ = data.images.shape
     shrink = max(1, round(math.sqrt(height * width) / SIDE))
-    images = images_shrunk(data.images, shrink)
     cameras = cameras_shrunk(data.cameras, shrink)
     views = np.unique(np.linspace(0, k - 1, min(k, VIEWS)).round().astype(np.int64))
     near, far = depths
     planes = np.geomspace(near, far, PLANES)
-    grey = np.ascontiguousarray(images.mean(axis=-1, dtype=np.float32))
     inner, w2c = _intrinsics(cameras), cameras.world_to_camera()
     sources, value = neighbours(cameras, views, SOURCES, near, far, rng)
+    # Of thousands of views most are never looked at: those in use alone are kept, small, at these places.
+    used = np.union1d(views, sources[value > LEAST_VALUE])
+    place = np.searchsorted(used, np.arange(k))
+    images = images_shrunk((data.images[int(i)] for i in used), shrink)
+    grey = np.ascontiguousarray(images.mean(axis=-1, dtype=np.float32))
     depth = np.zeros((len(views), *grey.shape[1:]), np.float32)
     score = np.full(depth.shape, -1, np.float32)
 
@@ -73,11 +76,11 @@ def depth_maps(data: TrainingSet, depths: tuple[float, float], rng: np.random.Ge
         homographies = np.empty((len(use), 3, 4))
         homographies[:, :, :3] = inner[use] @ relative[:, :3, :3] @ np.linalg.inv(inner[i])
         homographies[:, :, 3] = np.einsum("sab,sb->sa", inner[use], relative[:, :3, 3])
-        sweep(grey[i], grey[use], homographies, planes, depth[row], score[row])
+        sweep(grey[place[i]], grey[place[use]], homographies, planes, depth[row], score[row])
 
     for _ in threads.over(look, range(len(views))):
         pass
-    believed = DepthMaps(cameras[views], images[views], depth, score > LEAST_SCORE, np.zeros(depth.shape, bool))
+    believed = DepthMaps(cameras[views], images[place[views]], depth, score > LEAST_SCORE, np.zeros(depth.shape, bool))
     believed.sure[:] &= _agreed(believed, near, far, rng)
     _guess(believed)
     return believed
