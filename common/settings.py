@@ -64,6 +64,7 @@ class Tracking:
     uri: str = "sqlite:///results/mlflow.db"
     artifacts: str = "results/mlartifacts"
     renders: int = 3
+    patience: int = 120  # seconds that the end of a study waits for a store that does not answer
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,7 @@ SECTIONS: dict[str, type] = {
     "tracking": Tracking,
     "instant_ngp": InstantNgp,
 }
-MAY_BE_ZERO = ("renders", "timeout", "model")  # no renders, no limit, the first model
+MAY_BE_ZERO = ("renders", "patience", "timeout", "model")  # no renders, no waiting, no limit, the first model
 TABLES: dict[str, type] = {"scenes": SceneEntry, "command": Command}
 
 
