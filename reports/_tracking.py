@@ -26,7 +26,7 @@ from ._tracking_log import Log, is_remote
 __all__ = ["CELL", "FINGERPRINT", "KEY", "NO_TRACKING", "is_remote", "local_uri", "track", "track_cell"]
 KEY = AXES
 NO_TRACKING = "tracking.uri is empty"  # why nothing is logged where nobody wants it
-STRIKES = 5  # of a cell that a server in trouble does not take, while it answers otherwise
+STRIKES = 5  # tries of a cell that a server in trouble does not take, while it answers otherwise
 PAUSES_S = (1, 2, 4, 8, 15)  # between asking a store that is away; the last one again and again
 # Seconds of MLflow's own patience with one request, and how often it repeats it: a study logs hundreds of runs. A job
 # of one cell gives up sooner, since the end of the study logs what it did not.
@@ -93,7 +93,7 @@ def track_cell(study: str, cell: dict[str, str], results: Path, tracking: Tracki
         try:
             log = _open(study, tracking, RETRIES_OF_ONE, TIMEOUT_S)
             known = log.start(cell_name(cell)).get(cell_name(cell), [])
-            new = log.cell(cell, cell_folder(results, cell), known)
+            new = log.cell(cell, cell_folder(results, cell), known, fresh=True)
         except _tracking_errors.errors() as error:
             if _tracking_errors.kind(error) is not Kind.CELL:
                 away.says(_tracking_errors.words(error, tracking.uri))
@@ -144,17 +144,19 @@ class _Patience:
 
     def __init__(self, tracking: Tracking, say: Callable[[str], None]):
         self.tracking, self.say, self.answered = tracking, say, time.monotonic()
+        self.troubled = False  # by what was asked last
 
     def ask(self, what: Callable[[], T], answers: Callable[[], object] | None = None) -> T:
         """What `what` returns, asked until the patience is over or something else is wrong than that nobody is there.
 
-        With `answers`, which asks for next to nothing: raises TroubledError when that is answered and `what` is not.
+        With `answers`, which asks for next to nothing: raises TroubledError when that is answered and `what` is not,
+        unless it was so with what was asked before, too.
         """
         tries = strikes = 0
         while True:
             try:
                 value = what()
-                self.answered = time.monotonic()
+                self.answered, self.troubled = time.monotonic(), False
                 return value
             except _tracking_errors.errors() as error:
                 left_s = self.answered + self.tracking.patience - time.monotonic()
@@ -167,7 +169,10 @@ class _Patience:
                 tries += 1
                 if answers is not None and self._hears(answers):
                     strikes += 1
+                    if strikes == STRIKES and self.troubled:
+                        raise
                     if strikes == STRIKES:
+                        self.troubled = True
                         raise _tracking_errors.TroubledError(said) from None
 
     def _hears(self, answers: Callable[[], object]) -> bool:

@@ -16,9 +16,9 @@ from ..common.errors import UserError
 from ..common.settings import Tracking
 from . import _tracked_run, _tracking_errors
 from ._tracked_run import CELL, FINGERPRINT, WRITER
-from ._tracking_errors import Kind, masked
+from ._tracking_errors import Kind
 
-TRIES = 5  # of a cell, whose run others took for one that a crash had left
+TRIES = 10  # of a cell, whose run others took for one that a crash had left
 
 
 def is_remote(uri: str) -> bool:
@@ -37,7 +37,7 @@ class Run:
     started: int  # milliseconds since 1970, by the clock of its writer
 
 
-class _Gone(Exception):
+class _GoneError(Exception):
     """Another writer took this run for one that a crash had left."""
 
 
@@ -46,7 +46,7 @@ class Log:
 
     def __init__(self, client: Any, uri: str, study: str, tracking: Tracking):
         self.client, self.uri, self.study, self.tracking = client, uri, study, tracking
-        self.experiment = ""
+        self.experiment, self.writer = "", uuid.uuid4().hex
 
     def answers(self) -> None:
         """Raises what MLflow does when the store is away."""
@@ -62,33 +62,30 @@ class Log:
         self._delete(run for found in runs.values() for run in found if not run.finished)
         return {name: [run for run in found if run.finished] for name, found in runs.items()}
 
-    def cell(self, cell: dict[str, str], folder: Path, known: list[Run]) -> bool:
-        """Makes the cell have one finished run, that of its files; whether it had none before."""
-        name, writer, new = cell_name(cell), uuid.uuid4().hex, False
-        for _ in range(TRIES):
+    def cell(self, cell: dict[str, str], folder: Path, known: list[Run], fresh: bool = False) -> bool:
+        """Makes the cell have one finished run, that of its files; whether it had none before.
+
+        `known` are its finished runs as `start` returned them, `fresh` where that was a moment ago.
+        """
+        name, new = cell_name(cell), False
+        for attempt in range(TRIES):
             now = _fingerprint(folder, name)
-            if not any(run.fingerprint == now for run in known) and is_remote(self.uri):
+            if not (fresh and not attempt) and not any(run.fingerprint == now for run in known):
                 known = self._finished(name)  # others may have been here since
             if not any(run.fingerprint == now for run in known):
                 told = _content(cell, folder, self.tracking.renders)
                 try:
-                    self._write(told, {FINGERPRINT: now, WRITER: writer})
-                except _Gone:
-                    known = []
+                    self._write(told, {FINGERPRINT: now, WRITER: self.writer})
+                except _GoneError:
                     continue
-                new = True
-                runs = self._runs(name).get(name, [])
-                self._delete(run for run in runs if run.writer == writer and not run.finished)
-                known = [run for run in runs if run.finished]
+                new, known = True, self._finished(name)
             current = [run for run in known if run.fingerprint == now]
-            if _fingerprint(folder, name) != now or not current:
-                continue  # the cell was made anew meanwhile, or the others kept theirs and it is gone again
+            if not current or _fingerprint(folder, name) != now:
+                continue  # the cell was made anew meanwhile, or somebody removed the run just made
             keep = min(current, key=lambda run: (run.started, run.id))
             self._delete(run for run in known if run is not keep)
             return new
-        raise UserError(
-            f"MLflow at '{masked(self.tracking.uri)}': other writers removed the run of {name} {TRIES} times"
-        )
+        raise UserError(f"other writers removed the run of {name} {TRIES} times")
 
     def _write(self, told: _tracked_run.Content, tags: dict[str, str]) -> None:
         made = ""
@@ -103,7 +100,7 @@ class Log:
             away = _tracking_errors.kind(error) is not Kind.CELL
             if away or not made or self.client.get_run(made).info.lifecycle_stage == "active":
                 raise
-            raise _Gone from None
+            raise _GoneError from None
 
     def _experiment(self) -> str:
         """The id of the experiment, made where there is none; others may be making it too, or restoring it."""
@@ -142,7 +139,10 @@ class Log:
                 return known
 
     def _finished(self, name: str) -> list[Run]:
-        return [run for run in self._runs(name).get(name, []) if run.finished]
+        """The finished runs of a cell; what this writer left of it unfinished is removed."""
+        runs = self._runs(name).get(name, [])
+        self._delete(run for run in runs if run.writer == self.writer and not run.finished)
+        return [run for run in runs if run.finished]
 
     def _delete(self, runs: Iterable[Run]) -> None:
         for run in list(runs):
