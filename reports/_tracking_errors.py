@@ -13,6 +13,16 @@ SHORTEST = 4  # letters of a secret that is looked for in texts; a shorter one w
 LONGEST = 300  # letters of MLflow's own words
 AWAY_STATUS = (408, 429, 500, 502, 503, 504)  # what MLflow's own client tries again
 
+UNTRUSTED = "CERTIFICATE_VERIFY_FAILED"  # of TLS
+# What requests and urllib3 say in several hundred letters.
+PLAIN = {
+    r"too many (\d{3}) error responses": "it answers with error {0}",
+    r"Connection refused": "nobody answers there (connection refused)",
+    r"Failed to resolve|Name or service not known": "there is no computer of that name",
+    r"(?i)timed out|timeout exception": "it did not answer in time",
+    r"RemoteDisconnected|Connection aborted|Connection reset": "it ended the connection without an answer",
+}
+
 
 class Kind(Enum):
     """What to do after an error."""
@@ -58,7 +68,7 @@ def kind(error: BaseException) -> Kind:
     status = _status(error)
     if isinstance(error, (OSError, ValueError, ImportError)) and not isinstance(error, RequestException):
         return Kind.REFUSED
-    if status in (401, 403) or _is_damage(str(error)) or _is_another(error, status):
+    if status in (401, 403) or UNTRUSTED in str(error) or _is_damage(str(error)) or _is_another(error, status):
         return Kind.REFUSED
     return Kind.AWAY if status is None or status in AWAY_STATUS else Kind.CELL
 
@@ -73,12 +83,15 @@ def words(error: BaseException, uri: str) -> str:
         )
     if _is_damage(text):
         return f"the database is damaged ({_first_line(text, uri)}); move the file away, and all cells are logged anew"
-    if "CERTIFICATE_VERIFY_FAILED" in text:
+    if UNTRUSTED in text:
         return "its certificate is not trusted; name the authority's file in MLFLOW_TRACKING_SERVER_CERT_PATH"
     if _is_another(error, status):
         return f"what answers there is no MLflow server ({_first_line(text, uri)})"
     if isinstance(error, ImportError):
         return f"Python's driver of this database is not installed ({_first_line(text, uri)})"
+    for pattern, said in PLAIN.items():
+        if found := re.search(pattern, text):
+            return said.format(*found.groups())
     return _first_line(text, uri) or type(error).__name__
 
 

@@ -17,6 +17,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 PATIENCE_S = 120  # for a server to begin
+# No calls home, and no process for jobs that nobody gives it.
+QUIET = {"MLFLOW_DISABLE_TELEMETRY": "true", "DO_NOT_TRACK": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}
 HOP = ("connection", "transfer-encoding", "content-length", "keep-alive")  # headers of one connection
 
 
@@ -33,9 +35,9 @@ class Server:
         folder.mkdir(parents=True, exist_ok=True)
         self.folder, self.port = folder, free_port()
         self.command = [sys.executable, "-m", "mlflow", "server", "--host", "127.0.0.1", "--port", str(self.port)]
-        self.command += ["--backend-store-uri", store or f"sqlite:///{folder}/mlflow.db", "--workers", "2"]
+        self.command += ["--backend-store-uri", store or f"sqlite:///{folder}/mlflow.db", "--workers", "1"]
         self.command += ["--artifacts-destination", str(folder / "artifacts"), "--serve-artifacts", *options]
-        self.variables = {"MLFLOW_DISABLE_TELEMETRY": "true", "DO_NOT_TRACK": "true", **variables}
+        self.variables = {**QUIET, **variables}
         self.process: subprocess.Popen | None = None
 
     @property
@@ -68,10 +70,8 @@ class Server:
             return
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, how)
-        try:
+        with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.wait(20)
-        except subprocess.TimeoutExpired:
-            pass
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait(20)
@@ -103,7 +103,7 @@ class Proxy:
                 pass
 
         self.server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.server.daemon_threads = True
+        self.server.daemon_threads, self.server.block_on_close = True, False
         scheme = "http"
         if certificate:
             context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
