@@ -26,6 +26,9 @@ def check(path: Path, wait_s: float) -> None:
     try:
         with contextlib.closing(sqlite3.connect(f"{path.as_uri()}?mode=rw", uri=True, timeout=wait_s)) as database:
             database.execute("BEGIN IMMEDIATE")
+            database.execute(
+                "PRAGMA user_version = 1"
+            )  # where the file may only be read this fails, the line before not
             tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
             made_by = database.execute("SELECT version_num FROM alembic_version").fetchall() if _made(tables) else []
             database.rollback()

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+import uuid
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
@@ -45,12 +46,12 @@ def quick(monkeypatch):
 
 
 @pytest.fixture
-def study(tmp_path, request):
+def study(tmp_path):
     """A name that no other test has, and results of four cells."""
     results = tmp_path / "results" / "demo"
     for row in ROWS:
         write_cell(results, row)
-    return request.node.name, results
+    return f"study-{uuid.uuid4().hex}", results
 
 
 def runs_of(server, study):
@@ -290,9 +291,10 @@ def test_a_cell_that_is_not_taken_leaves_the_others(server, proxy, study):
     assert_right(server, name)
 
 
-@pytest.mark.parametrize(
-    "user, header", [("", "Bearer tok/en-4711"), ("ann:pass%23word@", "Basic YW5uOnBhc3Mjd29yZA==")]
-)
+USERS = {"": "Bearer tok/en-4711", "ann:pass%23word@": "Basic YW5uOnBhc3Mjd29yZA=="}  # in the address, and what is sent
+
+
+@pytest.mark.parametrize(("user", "header"), USERS.items())
 def test_no_password_is_told(server, proxy, study, user, header, monkeypatch, capfd, caplog):
     name, results = study
     monkeypatch.setenv("MLFLOW_TRACKING_TOKEN", "tok/en-4711")
