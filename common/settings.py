@@ -66,6 +66,7 @@ class Tracking:
     uri: str = "sqlite:///results/mlflow.db"
     artifacts: str = "results/mlartifacts"
     renders: int = 3
+    patience: int = 120  # seconds that the end of a study waits for a store that does not answer
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,8 @@ SECTIONS: dict[str, type] = {
     "tracking": Tracking,
     "instant_ngp": InstantNgp,
 }
-MAY_BE_ZERO = ("renders", "timeout", "model", "retries", "retry_wait")  # no renders, no limit, the first model, none
+# No renders, no waiting, no limit, the first model, no other attempt.
+MAY_BE_ZERO = ("renders", "patience", "timeout", "model", "retries", "retry_wait")
 TABLES: dict[str, type] = {"scenes": SceneEntry, "command": Command}
 
 

@@ -1,31 +1,39 @@
 """Copies a study's cells into MLflow: one experiment a study, one finished run a cell, however often it is repeated.
 
 The JSON files are the truth and MLflow the window on them. Each run carries a fingerprint of its cell's files: a run
-with the same fingerprint is left alone, any other run of the cell (changed files, a crash half-way) is replaced.
+with the same fingerprint is left alone, any other run of the cell (changed files, a crash half-way) is replaced
+(`_tracking_log.py`). A study goes on without its log: each cell is offered once, and the end of the study takes up what
+is missing.
 """
 
 import contextlib
-import hashlib
-import math
+import logging
 import os
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from ..common.cells import AXES, cell_folder, cell_name
 from ..common.errors import UserError
-from ..common.files import read_json
 from ..common.settings import Tracking
+from . import _tracking_errors, _tracking_sqlite
+from ._tracked_run import CELL, FILES, FINGERPRINT
+from ._tracking_away import Away
+from ._tracking_errors import Kind, masked
+from ._tracking_log import Log, is_remote
 
-CELL, FINGERPRINT = "viewbench.cell", "viewbench.fingerprint"
+__all__ = ["CELL", "FINGERPRINT", "KEY", "NO_TRACKING", "is_remote", "local_uri", "track", "track_cell"]
 KEY = AXES
 NO_TRACKING = "tracking.uri is empty"  # why nothing is logged where nobody wants it
-FILES = ("selection.json", "train.json", "metrics.json")
-
-
-def is_remote(uri: str) -> bool:
-    """Whether runs are logged to a server, cell by cell, rather than into a file beside the results."""
-    return uri.startswith(("http://", "https://"))
+STRIKES = 5  # tries of a cell that a server in trouble does not take, while it answers otherwise
+PAUSES_S = (1, 2, 4, 8, 15)  # between asking a store that is away; the last one again and again
+# Seconds of MLflow's own patience with one request, and how often it repeats it: a study logs hundreds of runs. A job
+# of one cell gives up sooner, since the end of the study logs what it did not.
+TIMEOUT_S, RETRIES, RETRIES_OF_ONE = 20, 2, 1
+QUIET = ("alembic", "mlflow.store.db.utils")  # log what is said in a sentence here
+Progress = Callable[[int, int | None, str], None]
+T = TypeVar("T")
 
 
 def track(
@@ -33,151 +41,144 @@ def track(
     cells: list[dict[str, str]],
     results: Path,
     tracking: Tracking,
-    progress: Callable[[int, int | None, str], None] = lambda done, total, text: None,
+    progress: Progress = lambda done, total, text: None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, int]:
     """Logs the cells of one study; returns how many runs were "logged" and how many were "kept".
 
     `cells` are rows of the grid (KEY as texts), `results` is results/STUDY. Cells without all their files are left
-    out. Raises UserError when the store cannot be reached: repeat the call once it can.
+    out. Removes what crashes have left in the experiment. Waits up to `tracking.patience` seconds, each time anew, for
+    a store that does not answer. Raises UserError when some cells were not taken: repeat the call.
     """
-    # A study logs hundreds of small runs: no telemetry, no long retries against a server that is down.
-    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
-    os.environ.setdefault("DO_NOT_TRACK", "true")
-    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")
-    os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", "20")
-    os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")
-    os.environ.setdefault("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT", "true")
-    import logging
-
-    logging.getLogger("alembic").setLevel(logging.WARNING)
-    from mlflow import MlflowClient
-    from mlflow.exceptions import MlflowException
-    from sqlalchemy.exc import SQLAlchemyError
-
-    uri = local_uri(tracking.uri)
-    try:
-        client = MlflowClient(tracking_uri=uri)
-        experiment = _experiment(client, study, tracking, is_remote(uri))
-        known = _known_runs(client, experiment)
-        done = {"logged": 0, "kept": 0}
-        ready = [cell for cell in cells if all((cell_folder(results, cell) / name).is_file() for name in FILES)]
+    away = Away(results, masked(tracking.uri))
+    patience = _Patience(tracking, say)
+    done, refused = {"logged": 0, "kept": 0}, []
+    ready = [cell for cell in cells if all((cell_folder(results, cell) / name).is_file() for name in FILES)]
+    with _explained(tracking.uri):
+        log = _open(study, tracking, RETRIES, tracking.patience)
+        known = patience.ask(log.start)
+        away.over()
         for number, cell in enumerate(ready):
-            folder = cell_folder(results, cell)
-            fingerprint = _fingerprint(folder)
             name = cell_name(cell)
-            runs = known.get(name, [])
-            current = [run for run in runs if run[1] == fingerprint]
-            for run_id, _ in [run for run in runs if run not in current[:1]]:
-                client.delete_run(run_id)
-            if current:
-                done["kept"] += 1
-            else:
-                _log(client, experiment, cell, name, fingerprint, folder, tracking.renders)
-                done["logged"] += 1
+            try:
+                new = patience.ask(
+                    lambda: log.cell(cell, cell_folder(results, cell), known.get(cell_name(cell), [])),  # noqa: B023
+                    log.answers,
+                )
+                done["logged" if new else "kept"] += 1
+            except (UserError, *_tracking_errors.errors()) as error:
+                if _tracking_errors.kind(error) is not Kind.CELL:
+                    raise
+                refused.append(f"{name}: {_tracking_errors.words(error, tracking.uri)}")
             progress(number + 1, len(ready), name)
-    except (MlflowException, SQLAlchemyError, OSError) as error:
-        text = str(error).strip().splitlines() or [type(error).__name__]
-        raise UserError(f"MLflow at '{tracking.uri}' did not take the runs: {text[0][:300]}") from None
+    if refused:
+        raise UserError(
+            f"MLflow at '{masked(tracking.uri)}' took {sum(done.values())} of {len(ready)} cells, first without "
+            f"{refused[0]}"
+        )
     return done
+
+
+def track_cell(study: str, cell: dict[str, str], results: Path, tracking: Tracking) -> dict[str, int]:
+    """Logs one cell while the study goes on; returns what `track` does.
+
+    Raises UserError at once where a job before this one found nobody (`_tracking_away.py`), and after a short while
+    where this one does: `track` at the end of the study takes up what is missing.
+    """
+    away = Away(results, masked(tracking.uri))
+    since_s = away.since_s()
+    if since_s is not None:
+        raise UserError(f"MLflow at '{masked(tracking.uri)}' was away {since_s:.0f} s ago, so it was not asked")
+    with _explained(tracking.uri):
+        try:
+            log = _open(study, tracking, RETRIES_OF_ONE, TIMEOUT_S)
+            known = log.start(cell_name(cell)).get(cell_name(cell), [])
+            new = log.cell(cell, cell_folder(results, cell), known, fresh=True)
+        except _tracking_errors.errors() as error:
+            if _tracking_errors.kind(error) is not Kind.CELL:
+                away.says(_tracking_errors.words(error, tracking.uri))
+            raise
+    away.over()
+    return {"logged": int(new), "kept": int(not new)}
 
 
 def local_uri(uri: str) -> str:
     """The URI with a relative sqlite path made absolute and its folder made; others as they are."""
-    prefix = "sqlite:///"
-    if not uri.startswith(prefix):
+    path = _tracking_sqlite.path_of(uri)
+    if path is None:
         return uri
-    path = Path(uri.removeprefix(prefix)).resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
-    return f"{prefix}{path}"
+    return f"{_tracking_sqlite.PREFIX}{path}"
 
 
-def _fingerprint(folder: Path) -> str:
-    digest = hashlib.sha256()
-    for name in FILES:
-        digest.update((folder / name).read_bytes() + b"\0")
-    return digest.hexdigest()
+def _open(study: str, tracking: Tracking, retries: int, wait_s: float) -> Log:
+    """The log of a study, without a request; waits so long for a file that is locked."""
+    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
+    os.environ.setdefault("DO_NOT_TRACK", "true")
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", str(retries))
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", str(TIMEOUT_S))
+    os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")
+    os.environ.setdefault("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT", "true")
+    uri = local_uri(tracking.uri)
+    if path := _tracking_sqlite.path_of(uri):
+        _tracking_sqlite.check(path, wait_s)
+    from mlflow import MlflowClient
+
+    for name in QUIET:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    return Log(MlflowClient(tracking_uri=uri), uri, study, tracking)
 
 
-def _experiment(client: Any, study: str, tracking: Tracking, remote: bool) -> str:
-    found = client.get_experiment_by_name(study)
-    if found is not None:
-        if found.lifecycle_stage == "deleted":
-            client.restore_experiment(found.experiment_id)
-        return found.experiment_id
-    location = None if remote else (Path(tracking.artifacts).resolve() / study).as_uri()
-    return client.create_experiment(study, artifact_location=location)
+@contextlib.contextmanager
+def _explained(uri: str) -> Iterator[None]:
+    """Errors of MLflow become UserError."""
+    try:
+        yield
+    except _tracking_errors.errors() as error:
+        said = _tracking_errors.words(error, uri)
+        raise UserError(f"MLflow at '{masked(uri)}' did not take the runs: {said}") from None
 
 
-def _known_runs(client: Any, experiment: str) -> dict[str, list[tuple[str, str | None]]]:
-    """Runs of the experiment by cell, as (run id, fingerprint); an unfinished run has no fingerprint that counts."""
-    known: dict[str, list[tuple[str, str | None]]] = {}
-    token = None
-    while True:
-        page = client.search_runs([experiment], max_results=1000, page_token=token)
-        for run in page:
-            fingerprint = run.data.tags.get(FINGERPRINT) if run.info.status == "FINISHED" else None
-            known.setdefault(run.data.tags.get(CELL, ""), []).append((run.info.run_id, fingerprint))
-        token = page.token
-        if not token:
-            return known
+class _Patience:
+    """Asks again while a store is away, for so many seconds since it last answered."""
 
+    def __init__(self, tracking: Tracking, say: Callable[[str], None]):
+        self.tracking, self.say, self.answered = tracking, say, time.monotonic()
+        self.troubled = False  # by what was asked last
 
-def _log(client: Any, experiment: str, cell: dict, name: str, fingerprint: str, folder: Path, renders: int) -> None:
-    from mlflow.entities import Metric, Param
+    def ask(self, what: Callable[[], T], answers: Callable[[], object] | None = None) -> T:
+        """What `what` returns, asked until the patience is over or something else is wrong than that nobody is there.
 
-    selection = read_json(folder / "selection.json", "selection")
-    train = read_json(folder / "train.json", "training record")
-    metrics = read_json(folder / "metrics.json", "metrics")
-    tags = {
-        CELL: name,
-        FINGERPRINT: fingerprint,
-        "commit": train["commit"],
-        "backend": cell["backend"],
-        "backend_version": train["version"],
-        "device": train["device"],
-        "viewbench": train.get("viewbench", ""),
-    }
-    run_name = "/".join(cell[key] for key in KEY[1:])
-    run_id = client.create_run(experiment, tags=tags, run_name=run_name).info.run_id
-    values = {**cell, "count": selection["count"], "n_views": selection["n_views"], "width": train.get("width")}
-    values |= {f"budget.{key}": value for key, value in train["budget"].items() if value is not None}
-    values |= {f"option.{key}": value for key, value in train.get("options", {}).items()}
-    values |= {f"selector.{key}": value for key, value in selection["parameters"].items()}
-    final = {
-        "psnr_db": metrics["psnr_db"],
-        "ssim": metrics["ssim"],
-        "lpips": metrics["lpips"],
-        "select_s": sum(selection["seconds"].values()),
-        "train_s": train["seconds"],
-        "evaluate_s": metrics["seconds"],
-        "iterations": train["iterations"],
-        "peak_rss_bytes": train["peak_rss_bytes"],
-        "n_primitives": train["n_primitives"],
-    }
-    logged = [Metric(key, value, 0, 0) for key, value in final.items() if _is_number(value)]
-    for point in train["curve"]:  # by step, and with the elapsed time as the time stamp and as a step of its own
-        stamp = round(1000 * (point["seconds"] or 0))
-        for key, metric in (("loss", "train/loss"), ("test_psnr_db", "train/test_psnr_db")):
-            if _is_number(point.get(key)):
-                logged.append(Metric(metric, point[key], stamp, int(point["step"])))
-                logged.append(Metric(f"{metric}_by_ms", point[key], stamp, stamp))
-    params = [Param(key, str(value)[:6000]) for key, value in values.items() if value is not None]
-    for start in range(0, max(len(params), len(logged)), 100):
-        client.log_batch(run_id, metrics=logged[start : start + 100], params=params[start : start + 100])
-    for artifact in FILES:
-        client.log_artifact(run_id, str(folder / artifact))
-    with contextlib.suppress(ValueError):
-        for render in _samples(metrics, folder, renders):
-            client.log_artifact(run_id, str(render), "renders")
-    client.set_terminated(run_id, "FINISHED")
+        With `answers`, which asks for next to nothing: raises TroubledError when that is answered and `what` is not,
+        unless it was so with what was asked before, too.
+        """
+        tries = strikes = 0
+        while True:
+            try:
+                value = what()
+                self.answered, self.troubled = time.monotonic(), False
+                return value
+            except _tracking_errors.errors() as error:
+                left_s = self.answered + self.tracking.patience - time.monotonic()
+                if _tracking_errors.kind(error) is not Kind.AWAY or left_s <= 0:
+                    raise
+                said = _tracking_errors.words(error, self.tracking.uri)
+                if not tries:
+                    self.say(f"MLflow at '{masked(self.tracking.uri)}': {said}; asking again for {left_s:.0f} s")
+                time.sleep(min(PAUSES_S[min(tries, len(PAUSES_S) - 1)], left_s))
+                tries += 1
+                if answers is not None and self._hears(answers):
+                    strikes += 1
+                    if strikes == STRIKES and self.troubled:
+                        raise
+                    if strikes == STRIKES:
+                        self.troubled = True
+                        raise _tracking_errors.TroubledError(said) from None
 
-
-def _samples(metrics: dict, folder: Path, count: int) -> list[Path]:
-    views = metrics["views"]
-    step = max(1, len(views) // max(1, count))
-    files = [folder / view["file"] for view in views[::step][:count] if "file" in view]
-    return [file for file in files if file.is_file()]
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    def _hears(self, answers: Callable[[], object]) -> bool:
+        try:
+            answers()
+        except _tracking_errors.errors():
+            return False
+        self.answered = time.monotonic()
+        return True

@@ -15,7 +15,7 @@ def heal(study: Study, results: Path) -> None:
     """Removes selections, records and stamps that are damaged; `results` is results/STUDY.
 
     Choices, records and scores that were edited or cut short go, and the record of a model that has no score and whose
-    files are not as training left them (evaluating it has failed, and would again), and the stamps of logging that
+    files are not as training left them (evaluating it has failed, and would again), and the stamp of logging that
     failed. Models with a score are not read: that may be gigabytes.
     """
     broken = [path for path in (results / "selections").rglob("*.json") if not _sound(path)]
@@ -25,7 +25,8 @@ def heal(study: Study, results: Path) -> None:
         broken += [path for path in files if path.is_file() and not _sound(path)]
         if files[1].is_file() and not files[2].is_file() and not _whole_model(folder):
             broken.append(files[1])
-    broken += [path for path in _stamps(results) if _failed(path)]
+    # Not those of single cells: the end of the study takes up what they missed.
+    broken += [path for path in (results / "tracked.json",) if _failed(path)]
     for path in broken:
         path.unlink(missing_ok=True)
 
@@ -43,10 +44,6 @@ def _whole_model(folder: Path) -> bool:
     with contextlib.suppress(UserError, AttributeError, KeyError, TypeError, OSError):
         return altered_file(folder, read_json(folder / "train.json")) is None
     return False
-
-
-def _stamps(results: Path) -> list[Path]:
-    return [results / "tracked.json", *(results / "tracked").rglob("*.json")]
 
 
 def _failed(stamp: Path) -> bool:

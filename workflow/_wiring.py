@@ -20,7 +20,8 @@ from ..common.cells import cell_name
 from ..common.errors import UserError
 from ..common.files import sha256_file
 from ..common.settings import PACKAGE, Settings
-from ..reports._tracking import is_remote
+from ..reports._tracking_errors import masked
+from ..reports._tracking_log import is_remote
 from ..scenes import seen
 from ..scenes.whereabouts import absence, python_of, renderable, renders
 from ..selectors import _run
@@ -335,9 +336,10 @@ class Wiring:
 
     @property
     def tracking(self) -> str:
-        """Where runs are logged to; hashed, since an address may hold a password."""
+        """Where runs are logged to, without the password that an address may hold; hashed, since it is long."""
         asked = self.settings.tracking
-        return hashlib.sha256(repr((asked.uri, asked.artifacts, asked.renders)).encode()).hexdigest()[:16]
+        where = (masked(asked.uri, asked.uri), asked.artifacts, asked.renders)
+        return hashlib.sha256(repr(where).encode()).hexdigest()[:16]
 
     @property
     def tracks_as_it_goes(self) -> bool:

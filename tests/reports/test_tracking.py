@@ -105,7 +105,7 @@ def test_a_server_that_is_down_is_one_sentence(store, monkeypatch):
     results, _ = store
     monkeypatch.setenv("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "0")
     with pytest.raises(UserError, match="did not take the runs"):
-        _tracking.track("demo", ROWS, results, Tracking(uri="http://127.0.0.1:9"))
+        _tracking.track("demo", ROWS, results, Tracking(uri="http://127.0.0.1:9", patience=0))
 
 
 def test_cells_without_all_their_files_are_left_out(store):

@@ -223,7 +223,7 @@ def test_an_error_of_snakemake_itself_is_said(clone):
 
 def test_a_tracking_server_that_is_down_is_named_and_tried_again(clone):
     (cell(clone) / "metrics.json").unlink()
-    clone.run(VIEWBENCH_TRACKING_URI="http://127.0.0.1:9", MLFLOW_HTTP_REQUEST_MAX_RETRIES="0")
+    clone.run(VIEWBENCH_TRACKING_URI="http://127.0.0.1:9", VIEWBENCH_TRACKING_PATIENCE="1")
     assert (cell(clone) / "metrics.json").is_file()
     page = clone.results / "reports" / "index.html"
     assert "not logged: MLflow at" in page.read_text(encoding="utf-8")
