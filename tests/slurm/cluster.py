@@ -1,4 +1,4 @@
-"""A Slurm cluster of two nodes on this machine, for a test: its own configuration, state, key and ports, and no systemd.
+"""A Slurm cluster of two nodes on this machine, for a test: its own configuration, state, key and ports, no systemd.
 
 Everything lies in one temporary folder, `/etc` is not touched, and all daemons end with the cluster. Memory limits hold
 (`OverMemoryKill`, looked at every second), control groups are not needed, and `sacct` works, with a MariaDB of its own.
@@ -25,6 +25,7 @@ PACKAGES = {
     "mariadb-server": "mariadbd",
 }
 PLACES = "/usr/sbin:/usr/bin:/sbin:/bin"
+NODE = "VIEWBENCH_TEST_NODE"  # of a daemon's variables
 UP_S = 120.0  # until a daemon answers
 
 SLURM = """\
@@ -59,8 +60,11 @@ AccountingStorageHost=127.0.0.1
 AccountingStoragePort={dbd}
 AccountingStoragePass={folder}/munge.socket
 AccountingStorageTRES=gres/gpu
+AccountingStoreFlags=job_comment
 OverTimeLimit=0
 KillWait=3
+SlurmdTimeout=15
+SlurmctldTimeout=15
 InactiveLimit=0
 MinJobAge=300
 GresTypes=gpu
@@ -104,7 +108,7 @@ class Cluster:
 
     folder: Path  # readable for all, and not longer than a socket's name allows
     cpus: int = 2  # of each node, real or not
-    memory: int = 6000  # MB of each node
+    memory: int = 16_000  # MB of each node, there or not
     daemons: list[tuple[str, subprocess.Popen]] = field(default_factory=list)
 
     def __enter__(self) -> "Cluster":
@@ -120,7 +124,7 @@ class Cluster:
             raise
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *given: object) -> None:
         with contextlib.suppress(OSError, subprocess.SubprocessError):
             self.call("scancel", "--quiet", "--state=PENDING", timeout=20)
             self.call("scancel", "--quiet", "--state=RUNNING", timeout=20)
@@ -140,7 +144,8 @@ class Cluster:
     @property
     def environment(self) -> dict[str, str]:
         """Variables of a process that submits jobs."""
-        return {**os.environ, "SLURM_CONF": str(self.folder / "slurm.conf")}
+        path = f"{self.folder}/bin:{os.environ.get('PATH', '')}:{PLACES}"
+        return {**os.environ, "SLURM_CONF": str(self.folder / "slurm.conf"), "PATH": path}
 
     def call(self, *command: str, timeout: float = 60) -> str:
         """What one of Slurm's programs prints; raises CalledProcessError where it fails."""
@@ -151,7 +156,22 @@ class Cluster:
 
     def node(self, name: str) -> subprocess.Popen:
         """Starts the daemon of a node, again where it has ended."""
-        return self._daemon(name, f"slurmd -D -N {name}".split())
+        return self._daemon(name, f"slurmd -D -N {name}".split(), {NODE: name})
+
+    def fail(self, name: str) -> None:
+        """Kills a node's daemon, and whatever runs on the node, as a loss of power does."""
+        for daemon_name, daemon in self.daemons:
+            if daemon_name == name and daemon.poll() is None:
+                daemon.kill()
+                daemon.wait()
+        self.daemons = [pair for pair in self.daemons if pair[0] != name]
+        # First those that watch over jobs, and would report their end; they have the daemon's variables.
+        for variable in (f"{NODE}={name}", f"SLURMD_NODENAME={name}"):
+            for process in Path("/proc").glob("[0-9]*"):
+                with contextlib.suppress(OSError):
+                    variables = (process / "environ").read_bytes().split(b"\0")
+                    if f"SLURM_CONF={self.folder}/slurm.conf".encode() in variables and variable.encode() in variables:
+                        os.kill(int(process.name), signal.SIGKILL)
 
     def _configure(self) -> None:
         ports = dict(zip(("ctld", "dbd", "sql", "node1", "node2"), _free_ports(5), strict=True))
@@ -175,8 +195,12 @@ class Cluster:
             (self.folder / name).write_text(text.format(**values), encoding="utf-8")
         (self.folder / "gpu0").touch()  # a device to Slurm, which does not open it
         (self.folder / "slurmdbd.conf").chmod(0o600)
-        for name in ("state", "spool-node1", "spool-node2", "sql"):
+        for name in ("state", "spool-node1", "spool-node2", "sql", "bin"):
             (self.folder / name).mkdir(exist_ok=True)
+        # Snakemake's plugin takes SLURM_CONF from the steps of a job, which elsewhere find /etc/slurm/slurm.conf.
+        step = self.folder / "bin" / "srun"
+        step.write_text(f'#!/bin/sh\nSLURM_CONF={self.folder}/slurm.conf exec /usr/bin/srun "$@"\n', encoding="utf-8")
+        step.chmod(0o755)
 
     def _start_munge(self) -> None:
         key = self.folder / "munge.key"
@@ -191,12 +215,17 @@ class Cluster:
         place = f"--datadir={self.folder}/sql"
         subprocess.run(
             ["mariadb-install-db", "--no-defaults", place, "--user=root", "--auth-root-authentication-method=normal"],
+            env=self.environment,
             check=True,
             capture_output=True,
         )
         door = f"--socket={self.folder}/sql.socket"
         options = [place, "--user=root", door, f"--port={self.sql_port}", "--bind-address=127.0.0.1"]
-        options += [f"--pid-file={self.folder}/sql.pid", "--innodb-buffer-pool-size=64M", "--innodb-lock-wait-timeout=900"]
+        options += [
+            f"--pid-file={self.folder}/sql.pid",
+            "--innodb-buffer-pool-size=64M",
+            "--innodb-lock-wait-timeout=900",
+        ]
         self._daemon("mariadb", ["mariadbd", "--no-defaults", *options])
         client = ["mariadb", "--no-defaults", door, "--user=root", "--execute"]
         self._until("mariadb", lambda: subprocess.run([*client, "SELECT 1"], capture_output=True).returncode == 0)
@@ -218,11 +247,15 @@ class Cluster:
             self.node(node)
         self._until("the nodes", lambda: self.call("sinfo", "-h", "-N", "-o", "%T").split() == ["idle", "idle"])
 
-    def _daemon(self, name: str, command: list[str]) -> subprocess.Popen:
-        environment = {**self.environment, "PATH": f"{os.environ.get('PATH', '')}:{PLACES}"}
+    def _daemon(self, name: str, command: list[str], variables: dict[str, str] | None = None) -> subprocess.Popen:
         with open(self.folder / f"{name}.out", "ab") as out:
             daemon = subprocess.Popen(
-                command, env=environment, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True
+                command,
+                env=self.environment | (variables or {}),
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+                start_new_session=True,
             )
         self.daemons.append((name, daemon))
         return daemon
