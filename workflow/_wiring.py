@@ -6,7 +6,7 @@ import hashlib
 import re
 import shlex
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from ..scenes import seen
 from ..scenes.whereabouts import absence, python_of, renderable, renders
 from ..selectors import _run
 from ._depends import Lists
+from ._resources import Needs, Size
 from ._study import Study
 
 # Installed packages whose version may change a step's numbers; a backend's version names its own.
@@ -52,6 +53,7 @@ class Wiring:
         self.cells = study.cells()
         self.lists = Lists(Path(self.results) / "depends", writes)
         self.checkpoints: Any = None  # Snakemake's, once it reads the rules
+        self.inside: Callable[[], None] | None = None  # what is done first in a process that a scheduler has started
 
     @property
     def cell_patterns(self) -> list[str]:
@@ -81,27 +83,38 @@ class Wiring:
     # Scenes
 
     @functools.cache  # noqa: B019 - one object a run
-    def _scene(self, name: str) -> tuple[str, str, str]:
-        """Format, holdout and hash of a scene."""
+    def _scene(self, name: str) -> tuple[str, str, str, Size]:
+        """Format, holdout and hash of a scene, and how large it is."""
         from ..scenes.digest import scene_sha256
         from ..scenes.load import open_scene
 
         with explained():
             scene = open_scene(name, self.settings)
-            return scene.format, scene.holdout, scene_sha256(scene)
+            cameras, tests = scene.train.cameras, len(scene.test or ())
+            size = Size(len(scene.train), tests, int(cameras.width.max()), int(cameras.height.max()))
+            return scene.format, scene.holdout, scene_sha256(scene), size
 
     def scene(self, wildcards: Any) -> str:
         """What a scene is: its content, its test split, and the code that reads it."""
         name = wildcards.scene
+        if self.inside:
+            self.inside()
         if not self.lists.writes:
             return self.lists.path(f"scene-{name}")
         if name in self.to_render:
             self.checkpoints.rendered.get(scene=name)  # until it is, all that needs the scene is planned later
-        format_name, holdout, sha256 = self._scene(name)
+        format_name, holdout, sha256, _ = self._scene(name)
         return self.lists.path(
             f"scene-{name}",
             ("scenes.load", plugins.source_name("scenes.formats", format_name)),
             {"format": format_name, "holdout": holdout, "sha256": sha256},
+        )
+
+    @cached_property
+    def needs(self) -> Needs:
+        """What the rules' jobs ask of a scheduler; in a job itself nothing is looked up."""
+        return Needs(
+            self.study, self.settings, lambda name: self._scene(name)[3] if self.lists.writes else None, self._gpu
         )
 
     @cached_property
@@ -299,6 +312,8 @@ class Wiring:
         It knows no executor yet: a profile for a cluster sets `resources`, and leaves the limit to the scheduler.
         """
         count = len(gpu.devices())
+        if workflow.remote_exec:
+            count = 1  # of an allocation, whose cells take turns
         if count and self.settings.compute.device.startswith("cuda:"):
             count = 1
         if count and "gpu" not in workflow.global_resources:

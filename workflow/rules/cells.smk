@@ -18,6 +18,9 @@ rule select:
     log:
         f"{RESULTS}/logs/select/{{scene}}/{{selector}}/{{part}}/{{seed}}.log",
     priority: 20
+    resources:
+        mem_mb=NEEDS.select_mb,
+        runtime=NEEDS.select_minutes,
     params:
         selector=lambda wildcards: STUDY.selector(wildcards.selector).selector,
         options=WIRING.selector_options,
@@ -44,6 +47,8 @@ rule train:
     priority: 40
     threads: SETTINGS.compute.threads
     resources:
+        mem_mb=NEEDS.train_mb,
+        runtime=NEEDS.train_minutes,
         gpu=WIRING.gpu,
     params:
         folder=subpath(output.train, parent=True),
@@ -71,6 +76,8 @@ rule evaluate:
     priority: 50
     threads: SETTINGS.compute.threads
     resources:
+        mem_mb=NEEDS.evaluate_mb,
+        runtime=NEEDS.evaluate_minutes,
         gpu=WIRING.gpu,
     params:
         folder=subpath(output[0], parent=True),

@@ -32,6 +32,7 @@ rule track_cell:
     log:
         f"{RESULTS}/logs/track/{AXES}.log",
     priority: 60
+    localrule: True
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,
@@ -60,6 +61,7 @@ rule track:
     log:
         f"{RESULTS}/logs/track.log",
     priority: 10  # the longest of what is done at the end
+    localrule: True
     params:
         study=GIVEN,
         results=Path(RESULTS).parent,
@@ -79,6 +81,7 @@ rule report:
         f"{RESULTS}/reports/{{report}}.items.json",
     log:
         f"{RESULTS}/logs/report/{{report}}.log",
+    localrule: True
     params:
         folder=subpath(output[0], ancestor=2),
     message:
@@ -96,6 +99,7 @@ rule page:
         f"{RESULTS}/reports/index.html",
     log:
         f"{RESULTS}/logs/report/page.log",
+    localrule: True
     params:
         folder=subpath(output[0], ancestor=2),
     message:

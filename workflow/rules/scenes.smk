@@ -26,6 +26,9 @@ rule render:
     log:
         f"{RESULTS}/logs/render/{{scene}}/{{piece}}.log",
     priority: 80
+    resources:
+        mem_mb=_resources.fixed(6000),
+        runtime=_resources.fixed(240),
     params:
         command=WIRING.render_command,
         part=WIRING.render_part,
@@ -43,12 +46,15 @@ checkpoint rendered:
     log:
         f"{RESULTS}/logs/render/{{scene}}.log",
     priority: 80
+    resources:
+        mem_mb=_resources.fixed(2000),
+        runtime=_resources.fixed(60),
     params:
         command=WIRING.render_command,
     message:
         "all of {wildcards.scene} is rendered"
     shell:
-        "{params.command} > {output:q} 2> {log:q}"
+        "{params.command} > {output:q} 2> {log:q} || {{ rm -f {output:q}; exit 1; }}"
 
 
 WIRING.checkpoints = checkpoints
@@ -64,6 +70,9 @@ rule describe:
     log:
         f"{RESULTS}/logs/describe/{{scene}}.log",
     priority: 30  # it takes a second, and a study that was stopped is reported with it
+    resources:
+        mem_mb=NEEDS.describe_mb,
+        runtime=_resources.fixed(15),
     params:
         width=WIRING.truth_width,
         dataset=WIRING.dataset,
@@ -89,6 +98,8 @@ rule features:
     priority: 10
     threads: SETTINGS.compute.threads
     resources:
+        mem_mb=NEEDS.features_mb,
+        runtime=NEEDS.features_minutes,
         gpu=WIRING.encoder_gpu,
     params:
         encoder=STUDY.encoder,
@@ -110,6 +121,8 @@ rule warm:
     priority: 100
     # CUDA code is compiled for the device that is there.
     resources:
+        mem_mb=_resources.fixed(4000),
+        runtime=_resources.fixed(30),
         gpu=WIRING.warm_gpu,
     params:
         backend=lambda wildcards: WIRING.trainers[wildcards.trainer],
@@ -127,6 +140,9 @@ rule warm_selector:
     log:
         f"{RESULTS}/logs/warm_selectors/{{plugin}}.log",
     priority: 90
+    resources:
+        mem_mb=_resources.fixed(2000),
+        runtime=_resources.fixed(15),
     message:
         "prepare selector {wildcards.plugin}"
     shell:
