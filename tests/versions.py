@@ -43,7 +43,7 @@ QUICK = (
             *("unposed", "written", "matching", "thinning", "kitti", "rgbd", "rooms"),
         )
     ),
-    *(f"tests/backends/test_{name}.py" for name in ("records", "pictures", "subset", "points", "metrics", "program")),
+    *(f"tests/backends/test_{name}.py" for name in ("records", "pictures", "subset", "points", "program")),
     *(f"tests/reports/test_{name}.py" for name in ("statistics", "tables", "reports", "selection_plot")),
 )
 
