@@ -38,6 +38,8 @@ backends: [{{name: splat, backend: splat, budget: {{iterations: 20}}}}]
 width: 48
 reference: false
 """
+APART = 40  # requests between two restarts
+AGAIN = 20  # times that a job is begun which found nobody, as another of a long study would be
 EVERY = 7  # of the writers is killed, of the cells has two writers, and of a hundred answers so many are lost
 
 
@@ -94,7 +96,10 @@ class Study:
         def write(number: int, cell: dict[str, str], killed: bool) -> None:
             stamp = self.folder / f"stamp-{number}.json"
             after_s = random.Random(number).uniform(2, 12) if killed else None
-            self.track("--cell", cell_name(cell), "--stamp", str(stamp), kill_after_s=after_s)
+            for _ in range(AGAIN if number % EVERY else 1):
+                self.track("--cell", cell_name(cell), "--stamp", str(stamp), kill_after_s=after_s)
+                if killed or "skipped" not in json.loads(stamp.read_text(encoding="utf-8")):
+                    break
 
         with ThreadPoolExecutor(writers) as pool:
             for done in [pool.submit(write, number, *job) for number, job in enumerate(jobs)]:
@@ -126,9 +131,9 @@ class Study:
 class Trouble(threading.Thread):
     """Restarts and kills the server and its database, one after the other, until it is told to stop."""
 
-    def __init__(self, server: Server, postgres: Postgres, study: Study, pause_s: float):
+    def __init__(self, server: Server, postgres: Postgres, study: Study, proxy: Proxy):
         super().__init__(daemon=True)
-        self.server, self.postgres, self.study, self.pause_s = server, postgres, study, pause_s
+        self.server, self.postgres, self.study, self.proxy = server, postgres, study, proxy
         self.over, self.done = threading.Event(), Counter[str]()
 
     def run(self) -> None:
@@ -139,8 +144,10 @@ class Trouble(threading.Thread):
                 "PostgreSQL crashed": lambda: self.postgres.control("restart", "-m", "immediate"),
                 "server SIGKILL": lambda: self.restart(signal.SIGKILL),
             }.items():
-                if self.over.wait(self.pause_s):
-                    return
+                enough = sum(self.proxy.requests.values()) + APART
+                while sum(self.proxy.requests.values()) < enough:
+                    if self.over.wait(0.1):
+                        return
                 cause()
                 self.done[name] += 1
                 # As if the minutes had gone by after which jobs ask again.
@@ -208,7 +215,7 @@ def loses_some():
 def one_by_one(study: Study, server: Server, postgres: Postgres, proxy: Proxy, writers: int) -> None:
     """A job a cell, `writers` at once, in an experiment that is not there yet."""
     study.make_cells()
-    trouble = Trouble(server, postgres, study, pause_s=15)
+    trouble = Trouble(server, postgres, study, proxy)
     trouble.start()
     study.track_cells(writers)
     longest_s = max(study.seconds)
@@ -239,7 +246,7 @@ def by_snakemake(study: Study, server: Server, postgres: Postgres, proxy: Proxy,
     for name in ("MLFLOW_TRACKING_USERNAME", "MLFLOW_TRACKING_PASSWORD"):
         del study.environment[name]
     proxy.loses = loses_some()
-    trouble = Trouble(server, postgres, study, pause_s=25)
+    trouble = Trouble(server, postgres, study, proxy)
     trouble.start()
     command = [sys.executable, "-m", "viewbench", "run", str(study.file), "-j", str(writers)]
     done = subprocess.run(command, env=study.environment, cwd=study.folder, capture_output=True, text=True)
