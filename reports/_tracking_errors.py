@@ -108,13 +108,14 @@ def _status(error: BaseException) -> int | None:
     """The HTTP status of an error; None where there was no answer."""
     from mlflow.exceptions import MlflowException
 
-    answer: Any = getattr(error, "response", None)
+    failed: Any = error
+    answer = getattr(failed, "response", None)
     if answer is not None:
         return answer.status_code
-    if not isinstance(error, MlflowException):
+    if not isinstance(failed, MlflowException):
         return None
     found = re.search(r"failed with error code (\d{3})", str(error))
-    return int(found[1]) if found else error.get_http_status_code()
+    return int(found[1]) if found else failed.get_http_status_code()
 
 
 def _is_damage(text: str) -> bool:

@@ -78,6 +78,11 @@ class Server:
         self.process = None
 
 
+class _Listener(ThreadingHTTPServer):
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Silent: clients are killed, and do not wait for ever."""
+
+
 class Proxy:
     """Hands requests on to a server. `loses(method, path)` says of a request that its answer is lost: the server has
     done what it asked, and the connection ends. `refuses` says which get a 503 and never reach it."""
@@ -102,7 +107,7 @@ class Proxy:
             def log_message(self, format: str, *args: object) -> None:
                 pass
 
-        self.server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.server = _Listener(("127.0.0.1", 0), Handler)
         self.server.daemon_threads, self.server.block_on_close = True, False
         scheme = "http"
         if certificate:
@@ -131,7 +136,7 @@ class Proxy:
             connection.request(request.command, request.path, body, headers)
             answer = connection.getresponse()
             content = answer.read()
-        except OSError:
+        except (OSError, http.client.HTTPException):  # the server was killed before or in the middle of its answer
             request.close_connection = True
             return
         finally:
