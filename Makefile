@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test lint types pytest bench gpu quality size external wheels datasheet format clean clean-results
+.PHONY: help setup dev reports dashboard test test-slurm lint types pytest bench gpu quality size external wheels datasheet format clean clean-results
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -22,6 +22,7 @@ help:
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
 	@echo "make size        seconds to 25 dB by size of the pictures, memory by number of views (10 minutes)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
+	@echo "make test-slurm  a study on a cluster of Slurm's, made and harmed here (root; INSTALL=1 installs Slurm; 20 minutes)"
 	@echo "make wheels      the package and, apart from it, the rendered rooms; make datasheet describes them"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
 
@@ -56,6 +57,7 @@ lint: dev
 	$(BIN)/ruff format --check
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/python -m tests.snakemake_lint
+	$(BIN)/hadolint workflow/container/Containerfile
 
 # What an editor with pyright shows of this clone, which may have any name, has no red and no yellow line.
 types: dev
@@ -83,6 +85,10 @@ size: dev
 # A program that is not ours behind `command:`; its environment is kept in build/external.
 external: dev
 	$(THREADS) $(BIN)/python -m tests.external_trainer build/external
+
+# workflow/profiles/slurm tried for real, on a cluster of two nodes that lives as long as the test.
+test-slurm: dev
+	$(THREADS) $(BIN)/python -m tests.slurm $(if $(INSTALL),--install) $(SLURM)
 
 # The code without the three rendered rooms, and these in a wheel of their own: `pip install --find-links dist
 # 'viewbench[rooms]'` takes both.

@@ -69,6 +69,10 @@ class Progress(logging.Handler):
             self._show(at_once=True)
         elif event == "JOB_INFO":
             job = vars(record)
+            again = ", ".join(job.get("output") or [])
+            if again in self.failures:  # it is tried once more
+                self.failures.discard(again)
+                self.pace.failed[job["rule_name"]] -= 1
             self.pace.begin(job["jobid"], job["rule_name"], dict(job.get("wildcards") or {}))
         elif event == "JOB_FINISHED":
             rule = self.pace.end(getattr(record, "job_id", -1))
@@ -76,13 +80,23 @@ class Progress(logging.Handler):
             self._show(final=rule == "page")
         elif event == "JOB_ERROR":
             self._fail(record)
+        elif event == "GROUP_ERROR":  # its jobs follow, each with its error
+            logs = list(getattr(record, "aux_logs", []) or [])
+            self._clear()
+            name = getattr(record, "groupid", "?")
+            words = said_by_scheduler(logs) or f"see {', '.join(map(str, logs))}"
+            print(f"failed: {name}: {words}", file=self.stream, flush=True)
 
     def _fail(self, record: logging.LogRecord) -> None:
-        self.pace.end(getattr(record, "jobid", -1), failed=True)
+        files = list(getattr(record, "output", []) or [])
+        # A group fails as a whole, and results are there whole or not at all.
+        made = getattr(record, "indent", False) and bool(files) and all(Path(file).exists() for file in files)
+        self.pace.end(getattr(record, "jobid", -1), failed=not made)
         rule = getattr(record, "rule_name", "?")
-        words = last_line(list(getattr(record, "log", []) or []))
-        output = ", ".join(getattr(record, "output", []) or [])
-        if output in self.failures:
+        logs = list(getattr(record, "log", []) or [])
+        words = said_by_scheduler(logs) or last_line([log for log in logs if ".snakemake" not in str(log)])
+        output = ", ".join(files)
+        if made or output in self.failures:
             return
         self.failures.add(output)
         self._clear()
@@ -178,7 +192,7 @@ def _worth_reading(record: logging.LogRecord) -> bool:
     if event is not None:
         # A job's failure is an error of Snakemake's too, which the line with the job's last words says better.
         of_a_job = getattr(record, "exception", "") == "RuleException" and "CalledProcessError" in str(record.msg)
-        return getattr(event, "name", "") in ("ERROR", "GROUP_ERROR") and not of_a_job
+        return getattr(event, "name", "") == "ERROR" and not of_a_job
     return record.levelno >= logging.WARNING or "Nothing to be done" in str(record.msg)
 
 
@@ -196,6 +210,17 @@ def salvage(study: Any, given: str) -> None:
         ["report", str(results)],
     ):
         subprocess.run([sys.executable, "-m", "viewbench", *arguments], check=False)
+
+
+def said_by_scheduler(logs: list[str]) -> str:
+    """Why a scheduler ended a job: the last line of Slurm's own in the logs; "" where there is none."""
+    found = ""
+    for log in logs:
+        path = Path(str(log).split(" ", 1)[0])
+        if path.is_file():
+            lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+            found = next((line for line in reversed(lines) if line.startswith("slurmstepd")), found)
+    return found
 
 
 def last_line(logs: list[str]) -> str:
