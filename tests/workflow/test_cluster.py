@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.slurm.compare import differences
 from tests.workflow.clones import Clone
 from viewbench.common import settings as settings_file
 from viewbench.common.settings import PACKAGE
@@ -172,11 +173,15 @@ def test_each_attempt_asks_for_twice_as_much(needs):
     assert [_resources.fixed(7)(Wildcards, attempt=attempt) for attempt in (1, 2, 3)] == [7, 14, 28]
 
 
-def test_nothing_is_looked_up_in_a_job():
+def test_nothing_is_looked_up_in_a_job(needs):
+    class Elsewhere(Wildcards):
+        scene = "nowhere"
+
     settings = settings_file.load()
-    wiring = _wiring.Wiring(_study.load("quick", settings), settings, writes=False)
-    assert isinstance(wiring.needs.train_mb(Wildcards, attempt=1), int)
-    assert wiring._scene.cache_info().currsize == 0
+    in_a_job = _wiring.Wiring(_study.load("quick", settings), settings, writes=False).needs
+    assert isinstance(in_a_job.train_mb(Elsewhere, attempt=1), int)
+    with pytest.raises(Exception, match="nowhere"):
+        needs.train_mb(Elsewhere, attempt=1)
 
 
 @pytest.mark.parametrize("recording", ["quick", "rooms", "real", "walks"])
@@ -264,3 +269,22 @@ print(sum(kernel.double.stats.cache_hits.values()))
 
 def test_jobs_of_an_earlier_run_are_asked_for_only_where_there_was_one(tmp_path):
     _cluster.cancel_leftovers(tmp_path / "none")  # there is no squeue to ask
+
+
+def test_a_changed_bit_is_seen(finished, tmp_path):
+    """Of two runs that `make test-slurm` compares."""
+    clone = finished.copied(tmp_path)
+    assert differences(finished.results, clone.results) == []
+    model = cell(clone, 1) / "model.ply"
+    content = bytearray(model.read_bytes())
+    content[-1] ^= 1
+    model.write_bytes(content)
+    table = clone.results / "results.csv"
+    table.write_text(re.sub(r"(splat,uniform,0.02,0,\d+,\d+,\d)", r"\g<1>1", table.read_text()))
+    (cell(clone, 0) / "renders" / "more.png").touch()
+    place = "cells/splat/room_human/uniform/0.02"
+    assert sorted(differences(finished.results, clone.results)) == [
+        f"{place}/0/renders/more.png: only in one",
+        f"{place}/1/model.ply: differs",
+        "results.csv: differs",
+    ]
