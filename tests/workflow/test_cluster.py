@@ -170,7 +170,7 @@ def test_each_attempt_asks_for_twice_as_much(needs):
         asked = [getattr(needs, name)(Wildcards, attempt=attempt) for attempt in (1, 2, 3)]
         assert asked[0] > 1, name
         assert asked == [asked[0], 2 * asked[0], 4 * asked[0]], name
-    assert [_resources.fixed(7)(Wildcards, attempt=attempt) for attempt in (1, 2, 3)] == [7, 14, 28]
+    assert [Needs.fixed(7)(Wildcards, attempt=attempt) for attempt in (1, 2, 3)] == [7, 14, 28]
 
 
 def test_nothing_is_looked_up_in_a_job(needs):
