@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server
+.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server test-slurm
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -24,6 +24,7 @@ help:
 	@echo "make memory      peak memory of choosing, training and scoring by number of frames, up to 3,000 (10 minutes)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make test-server a study logged to MLflow's server over PostgreSQL while both are killed (10 minutes; INSTALL=1: apt-get)"
+	@echo "make test-slurm  a study on a cluster of Slurm's, made and harmed here (root; INSTALL=1 installs Slurm; 20 minutes)"
 	@echo "make wheels      the package and, apart from it, the rendered rooms; make datasheet describes them"
 	@echo "make lock        requirements.lock and requirements-select.lock, after a change of what is needed"
 	@echo "make audit       known vulnerabilities of what the lock files name (asks PyPI; or ADVISORIES=FOLDER)"
@@ -68,6 +69,7 @@ lint: dev
 	$(BIN)/ruff format --check
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/python -m tests.snakemake_lint
+	$(BIN)/hadolint workflow/container/Containerfile
 
 # What an editor with pyright shows of this clone, which may have any name, has no red and no yellow line.
 types: dev
@@ -102,6 +104,10 @@ external: dev
 # MLflow's server over PostgreSQL, both restarted and killed under eight writers; packages are kept in build/server.
 test-server: dev
 	$(THREADS) $(BIN)/python -m tests.server build/server $(if $(INSTALL),--install) $(SERVER)
+
+# workflow/profiles/slurm tried for real, on a cluster of two nodes that lives as long as the test.
+test-slurm: dev
+	$(THREADS) $(BIN)/python -m tests.slurm $(if $(INSTALL),--install) $(SLURM)
 
 # The code without the three rendered rooms, and these in a wheel of their own: `pip install --find-links dist
 # 'viewbench[rooms]'` takes both.

@@ -106,7 +106,9 @@ def _lock(uuid: str) -> int | None:
     with contextlib.suppress(OSError):
         folder.mkdir(exist_ok=True)
         folder.chmod(0o1777)
-    path = folder / uuid.replace("/", "_")
+    # Nodes of a cluster may share the folder: a number alone means another device on each.
+    name = uuid if uuid.startswith(("GPU-", "MIG-")) else f"{os.uname().nodename}-{uuid}"
+    path = folder / name.replace("/", "_")
     with contextlib.suppress(OSError):
         os.close(os.open(path, os.O_CREAT | os.O_EXCL, 0o666))
         path.chmod(0o666)

@@ -27,6 +27,15 @@ class Unforced(set):
         pass
 
 
+class Nodes(set):
+    """Nodes that failed, which the plugin (2.8.0) has sbatch avoid. It asks sacct for the node of a job that is in the
+    queue again, which has none: "None assigned", with which sbatch refuses every job of the run."""
+
+    def add(self, name: str) -> None:
+        if " " not in name:
+            super().add(name)
+
+
 def inside(workflow: Any) -> None:
     """In a process that the scheduler has started for a job or a group: to be called when its jobs are looked up, since
     these settings are not there yet when the workflow is read."""
@@ -42,8 +51,10 @@ def start(workflow: Any) -> None:
     if not workflow.is_main_process or workflow.executor_plugin.name != SLURM:
         return
     cancel_leftovers(RUNS)
+    executor = workflow.scheduler._executor
     # The plugin gives all jobs of a run one name.
-    RUNS.write_text(f"{workflow.scheduler._executor.run_uuid}\n", encoding="utf-8")
+    RUNS.write_text(f"{executor.run_uuid}\n", encoding="utf-8")
+    executor._failed_nodes = Nodes(getattr(executor, "_failed_nodes", ()))
     if workflow.execution_settings.keep_incomplete:
         for job in workflow.dag.needrun_jobs():
             if not job.is_local:

@@ -78,17 +78,25 @@ class Progress(logging.Handler):
             self._tell(at_once=True)
         elif event == "JOB_INFO":
             job = vars(record)
-            self.pace.begin(job["jobid"], job["rule_name"], dict(job.get("wildcards") or {}))
             output = _listed(record, "output")
-            self.failures.discard(output)  # tried again, as a cluster's jobs are
-            if self.file:
-                self.file.failed.pop(output, None)
+            if output in self.failures:  # it is tried once more
+                self.failures.discard(output)
+                self.pace.failed[job["rule_name"]] -= 1
+                if self.file:
+                    self.file.failed.pop(output, None)
+            self.pace.begin(job["jobid"], job["rule_name"], dict(job.get("wildcards") or {}))
         elif event == "JOB_FINISHED":
             rule = self.pace.end(getattr(record, "job_id", -1))
             self.phase = "looking for what is next"
             self._show(final=rule == "page")
         elif event == "JOB_ERROR":
             self._fail(record)
+        elif event == "GROUP_ERROR":  # its jobs follow, each with its error
+            logs = list(getattr(record, "aux_logs", []) or [])
+            self._clear()
+            name = getattr(record, "groupid", "?")
+            words = said_by_scheduler(logs) or f"see {', '.join(map(str, logs))}"
+            print(f"failed: {name}: {words}", file=self.stream, flush=True)
 
     def _tell(self, at_once: bool = False) -> None:
         """Writes the run's file; a second here or there does not matter to who reads it."""
@@ -105,13 +113,16 @@ class Progress(logging.Handler):
                 self._tell(at_once=True)
 
     def _fail(self, record: logging.LogRecord) -> None:
+        files = list(getattr(record, "output", []) or [])
+        # A group fails as a whole, and results are there whole or not at all.
+        made = getattr(record, "indent", False) and bool(files) and all(Path(file).exists() for file in files)
         ended = self.pace.running.get(getattr(record, "jobid", -1))
-        self.pace.end(getattr(record, "jobid", -1), failed=True)
+        self.pace.end(getattr(record, "jobid", -1), failed=not made)
         rule = getattr(record, "rule_name", "?")
         logs = list(getattr(record, "log", []) or [])
-        words = last_line(logs)
-        output = _listed(record, "output")
-        if output in self.failures:
+        words = said_by_scheduler(logs) or last_line([log for log in logs if ".snakemake" not in str(log)])
+        output = ", ".join(files)
+        if made or output in self.failures:
             return
         self.failures.add(output)
         if self.file:
@@ -211,7 +222,7 @@ def _worth_reading(record: logging.LogRecord) -> bool:
     if event is not None:
         # A job's failure is an error of Snakemake's too, which the line with the job's last words says better.
         of_a_job = getattr(record, "exception", "") == "RuleException" and "CalledProcessError" in str(record.msg)
-        return getattr(event, "name", "") in ("ERROR", "GROUP_ERROR") and not of_a_job
+        return getattr(event, "name", "") == "ERROR" and not of_a_job
     return record.levelno >= logging.WARNING or "Nothing to be done" in str(record.msg)
 
 
@@ -231,8 +242,20 @@ def salvage(study: Any, given: str) -> None:
         subprocess.run([sys.executable, "-m", "viewbench", *arguments], check=False)
 
 
+<<<<<<< HEAD
 def _listed(record: logging.LogRecord, what: str) -> str:
     return ", ".join(getattr(record, what, []) or [])
+=======
+def said_by_scheduler(logs: list[str]) -> str:
+    """Why a scheduler ended a job: the last line of Slurm's own in the logs; "" where there is none."""
+    found = ""
+    for log in logs:
+        path = Path(str(log).split(" ", 1)[0])
+        if path.is_file():
+            lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+            found = next((line for line in reversed(lines) if line.startswith("slurmstepd")), found)
+    return found
+>>>>>>> slurm
 
 
 def last_line(logs: list[str]) -> str:

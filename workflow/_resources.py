@@ -138,11 +138,11 @@ class Needs:
         size = self._size(wildcards.scene)
         return doubled(1500 + 24e3 * size.views / MB, attempt) if size else 1
 
+    @staticmethod
+    def fixed(value: int) -> Callable[..., int]:
+        """A resource of a job that depends on no scene: so much, and more when it failed."""
 
-def fixed(value: int) -> Callable[..., int]:
-    """A resource of a job that depends on no scene: so much, and more when it failed."""
+        def of_attempt(wildcards: Any, attempt: int) -> int:
+            return doubled(value, attempt)
 
-    def of_attempt(wildcards: Any, attempt: int) -> int:
-        return doubled(value, attempt)
-
-    return of_attempt
+        return of_attempt

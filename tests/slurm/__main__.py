@@ -79,8 +79,9 @@ def attempt(folder: Path) -> int:
         say(f"killed; {len(left)} jobs are left in the queue; starting it again")
         wrong += [] if left else ["no job was left when the main process was killed"]
         subprocess.run(command(two, SLURM, "--unlock"), cwd=two, env=environment(cluster), check=True)
+        before = {line.split()[0] for line in left}
         main_process = by_slurm(two, cluster)
-        harm(main_process, cluster)
+        harm(main_process, cluster, before)
         status = main_process.wait(PATIENCE_S)
         wrong += [] if status == 0 else [f"the run by Slurm ended with {status}"]
         found = allocations(cluster.environment)
@@ -96,17 +97,24 @@ def attempt(folder: Path) -> int:
     return len(wrong)
 
 
-def harm(main_process: subprocess.Popen, cluster: Cluster) -> None:
-    """Cancels a job with cells, shortens the time of another, and kills a third one's node."""
-    number = wait(main_process, lambda: cells_jobs(cluster, "RUNNING"), "cells")[0]
+def harm(main_process: subprocess.Popen, cluster: Cluster, seen: set[str]) -> None:
+    """Cancels a job with cells, shortens the time of another, and kills a third one's node; none of those `seen`."""
+
+    def another() -> str:
+        def running() -> list[str]:
+            return [job for job in cells_jobs(cluster, "RUNNING") if job not in seen]
+
+        number = wait(main_process, running, "another job with cells")[0]
+        seen.add(number)
+        return number
+
+    number = another()
     cluster.call("scancel", number)
     say(f"cancelled job {number}")
-    seen = {number}
-    number = wait(main_process, lambda: [job for job in cells_jobs(cluster, "RUNNING") if job not in seen], "cells")[0]
+    number = another()
     cluster.call("scontrol", "update", f"JobId={number}", "TimeLimit=1")
     say(f"job {number} has a minute")
-    seen.add(number)
-    number = wait(main_process, lambda: [job for job in cells_jobs(cluster, "RUNNING") if job not in seen], "cells")[0]
+    number = another()
     node = cluster.call("squeue", "--noheader", "--jobs", number, "--format=%N").strip()
     cluster.fail(node)
     say(f"{node} has failed, which had job {number}")
@@ -144,7 +152,9 @@ def check(found: list[Allocation]) -> list[str]:
 
 
 def by_slurm(folder: Path, cluster: Cluster) -> subprocess.Popen:
-    options = ["--set-resources", STARVED, "--group-components", f"cells-{{backend}}-{{scene}}-{{selector}}={GROUP}"]
+    # All groups, since these take the place of the profile's.
+    groups = [f"cells-{{backend}}-{{scene}}-{{selector}}={GROUP}", "choices-{scene}-{selector}=50"]
+    options = ["--set-resources", STARVED, "--group-components", *groups]
     quick = ["--slurm-init-seconds-before-status-checks", "3", "--latency-wait", "10"]
     return run(folder, environment(cluster), SLURM, *options, *quick)
 

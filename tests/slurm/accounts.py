@@ -5,7 +5,7 @@ import subprocess
 from collections import defaultdict
 from dataclasses import dataclass
 
-FIELDS = ("JobID", "State", "ExitCode", "ElapsedRaw", "CPUTimeRAW", "MaxRSS", "AllocTRES", "Comment")
+FIELDS = ("JobID", "State", "ExitCode", "ElapsedRaw", "CPUTimeRAW", "TimelimitRaw", "MaxRSS", "AllocTRES", "Comment")
 UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
 GROUP = re.compile(r"rule_(choices|cells)-")
 
@@ -19,6 +19,7 @@ class Allocation:
     exit_code: str
     elapsed_s: int
     cpu_s: int  # allocated, used or not
+    limit_minutes: int  # as asked for
     rss: float  # bytes, the most of its steps
     tres: str
     purpose: str  # group or rule
@@ -37,9 +38,11 @@ def allocations(environment: dict[str, str]) -> list[Allocation]:
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=60)
     found: list[Allocation] = []
     for line in done.stdout.splitlines():
-        number, state, code, elapsed, cpu, rss, tres, comment = line.split("|", len(FIELDS) - 1)
+        number, state, code, elapsed, cpu, limit, rss, tres, comment = line.split("|", len(FIELDS) - 1)
         if "." not in number:
-            found.append(Allocation(number, state, code, int(elapsed), int(cpu), 0.0, tres, _purpose(comment)))
+            found.append(
+                Allocation(number, state, code, int(elapsed), int(cpu), _minutes(limit), 0.0, tres, _purpose(comment))
+            )
         elif rss and found:
             found[-1].rss = max(found[-1].rss, _bytes(rss))
     return found
@@ -50,6 +53,10 @@ def _purpose(comment: str) -> str:
     return group[1] if group else comment.removeprefix("rule_").partition("_wildcards_")[0]
 
 
+def _minutes(text: str) -> int:
+    return int(text) if text.isdigit() else 0
+
+
 def _bytes(text: str) -> float:
     found = re.fullmatch(r"([\d.]+)([KMG]?)", text)
     return float(found[1]) * UNITS[found[2]] if found else 0.0
@@ -57,12 +64,10 @@ def _bytes(text: str) -> float:
 
 def table(found: list[Allocation]) -> str:
     """One line each."""
-    lines = [f"{'job':>5} {'for':16} {'state':24} {'exit':5} {'seconds':>7} {'RSS MB':>7}  resources"]
+    lines = [f"{'job':>5} {'for':16} {'state':24} {'exit':5} {'seconds':>7} {'minutes':>7} {'RSS MB':>7}  resources"]
     for one in found:
-        rss = f"{one.rss / UNITS['M']:7.0f}"
-        lines.append(
-            f"{one.number:>5} {one.purpose:16} {one.state:24} {one.exit_code:5} {one.elapsed_s:7} {rss}  {one.tres}"
-        )
+        numbers = f"{one.elapsed_s:7} {one.limit_minutes:7} {one.rss / UNITS['M']:7.0f}"
+        lines.append(f"{one.number:>5} {one.purpose:16} {one.state:24} {one.exit_code:5} {numbers}  {one.tres}")
     return "\n".join(lines)
 
 

@@ -27,8 +27,8 @@ rule render:
         f"{RESULTS}/logs/render/{{scene}}/{{piece}}.log",
     priority: 80
     resources:
-        mem_mb=_resources.fixed(6000),
-        runtime=_resources.fixed(240),
+        mem_mb=NEEDS.fixed(6000),
+        runtime=NEEDS.fixed(240),
     params:
         command=WIRING.render_command,
         part=WIRING.render_part,
@@ -47,8 +47,8 @@ checkpoint rendered:
         f"{RESULTS}/logs/render/{{scene}}.log",
     priority: 80
     resources:
-        mem_mb=_resources.fixed(2000),
-        runtime=_resources.fixed(60),
+        mem_mb=NEEDS.fixed(2000),
+        runtime=NEEDS.fixed(60),
     params:
         command=WIRING.render_command,
     message:
@@ -72,7 +72,7 @@ rule describe:
     priority: 30  # it takes a second, and a study that was stopped is reported with it
     resources:
         mem_mb=NEEDS.describe_mb,
-        runtime=_resources.fixed(15),
+        runtime=NEEDS.fixed(15),
     params:
         width=WIRING.truth_width,
         dataset=WIRING.dataset,
@@ -121,8 +121,8 @@ rule warm:
     priority: 100
     # CUDA code is compiled for the device that is there.
     resources:
-        mem_mb=_resources.fixed(4000),
-        runtime=_resources.fixed(30),
+        mem_mb=NEEDS.fixed(4000),
+        runtime=NEEDS.fixed(30),
         gpu=WIRING.warm_gpu,
     params:
         backend=lambda wildcards: WIRING.trainers[wildcards.trainer],
@@ -141,8 +141,8 @@ rule warm_selector:
         f"{RESULTS}/logs/warm_selectors/{{plugin}}.log",
     priority: 90
     resources:
-        mem_mb=_resources.fixed(2000),
-        runtime=_resources.fixed(15),
+        mem_mb=NEEDS.fixed(2000),
+        runtime=NEEDS.fixed(15),
     message:
         "prepare selector {wildcards.plugin}"
     shell:
