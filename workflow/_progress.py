@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ._pace import Pace, clock
-from ._run_file import EVERY_S, RunFile
+from ._progress_file import EVERY_S, RunFile
 
 TICK_S = 1.0  # between two drawings on a terminal
 LINE_S = 20.0  # between two lines elsewhere

@@ -9,7 +9,7 @@ from ..common.cells import cell_folder, cell_name
 from ..common.errors import UserError
 from ..common.files import read_json
 from ..common.settings import Settings
-from ._run_file import Job, Run
+from ._progress_file import Job, Run
 from ._stale import Asked
 from ._study import Study
 

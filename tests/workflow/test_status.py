@@ -15,7 +15,7 @@ import pytest
 from tests.conftest import ROOM
 from tests.workflow.clones import Clone, take_frames
 from viewbench.common import settings as settings_file
-from viewbench.workflow import _pace, _run_file, _standing, _study
+from viewbench.workflow import _pace, _progress_file, _standing, _study
 
 STUDY = """
 scenes: [walk]
@@ -165,15 +165,15 @@ def study(clone, monkeypatch):
     ],
 )
 def test_which_cells_a_failed_job_costs(study, rule, wildcards, cells):
-    job = _run_file.Job(rule, wildcards, 0.0)
+    job = _progress_file.Job(rule, wildcards, 0.0)
     assert sum(job.of(cell, study) for cell in study.cells()) == cells
 
 
 def test_a_run_is_alive_while_its_process_is(tmp_path):
     pace = _pace.Pace()
-    file = _run_file.RunFile(tmp_path)
+    file = _progress_file.RunFile(tmp_path)
     file.write(pace, 12.5, "training", at_once=True)
-    run = _run_file.read(tmp_path)
+    run = _progress_file.read(tmp_path)
     assert run is not None
     assert run.alive
     assert not replace(run, started="1").alive, "another process has its number now"
@@ -184,19 +184,19 @@ def test_a_run_is_alive_while_its_process_is(tmp_path):
 
 
 def test_a_run_on_another_machine_is_alive_while_it_is_heard_of(tmp_path):
-    file = _run_file.RunFile(tmp_path)
+    file = _progress_file.RunFile(tmp_path)
     file.write(_pace.Pace(), None, "", at_once=True)
-    run = _run_file.read(tmp_path)
+    run = _progress_file.read(tmp_path)
     assert run is not None
     for elsewhere in (replace(run, host="node7"), replace(run, boot="an earlier start of this machine")):
         assert elsewhere.alive
-        assert not replace(elsewhere, said=run.said - _run_file.GONE_S - 1).alive
+        assert not replace(elsewhere, said=run.said - _progress_file.GONE_S - 1).alive
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"running": [1], "failed": []}', "\x00"])
 def test_a_damaged_record_is_none(tmp_path, content):
-    (tmp_path / _run_file.FILE).write_text(content, encoding="utf-8")
-    assert _run_file.read(tmp_path) is None
+    (tmp_path / _progress_file.FILE).write_text(content, encoding="utf-8")
+    assert _progress_file.read(tmp_path) is None
 
 
 def test_work_that_is_left_is_told_by_cells_of_the_same_backend():

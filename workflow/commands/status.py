@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from .._run_file import Run
+    from .._progress_file import Run
     from .._standing import Standing
     from .._study import Study
 
@@ -30,12 +30,12 @@ def command(context: click.Context, study: str, results: Path, everything: bool,
     status: 0 when all cells are done, 1 when something failed, 3 when some are still to be done and none failed.
     """
     from ...common import settings as settings_file
-    from .. import _run_file, _standing, _study
+    from .. import _progress_file, _standing, _study
 
     settings = settings_file.load()
     checked = _study.load(study, settings)
     folder = results / checked.name
-    run = _run_file.read(folder)
+    run = _progress_file.read(folder)
     cells = _standing.standing(checked, folder, settings, run)
     counts = _standing.counts(cells)
     others = _standing.beside(checked, run)

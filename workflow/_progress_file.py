@@ -1,4 +1,4 @@
-"""What a run tells of itself while it goes, in results/STUDY/run.json, and whether that run is still there."""
+"""What a run tells of itself while it goes, in results/STUDY/progress.json, and whether that run is still there."""
 
 import contextlib
 import os
@@ -12,7 +12,7 @@ from typing import Any
 from ..common.errors import UserError
 from ..common.files import read_json, write_json
 
-FILE = "run.json"
+FILE = "progress.json"
 EVERY_S = 2.0  # between two writings where something happens
 SILENT_S = 20.0  # and where nothing does
 GONE_S = 120.0  # a run on another machine that has been silent for so long is gone
