@@ -7,6 +7,7 @@ from ..backends._evaluate import altered_file
 from ..common.cells import cell_folder
 from ..common.errors import UserError
 from ..common.files import read_json, unsealed
+from ..common.holding import sweep
 from ..reports._tracking import NO_TRACKING
 from ._study import Study
 
@@ -19,6 +20,7 @@ def heal(study: Study, results: Path) -> None:
     failed. Models with a score are not read: that may be gigabytes.
     """
     broken = [path for path in (results / "selections").rglob("*.json") if not _sound(path)]
+    sweep(results)
     for cell in study.cells():
         folder = cell_folder(results, cell)
         files = [folder / f"{name}.json" for name in ("selection", "train", "metrics")]

@@ -110,9 +110,7 @@ class Wiring:
         return frozenset(renderable(self.study.scenes, self.settings) if renders(self.settings) else ())
 
     def forget_renders(self) -> None:
-        """Removes what says that a scene is rendered which is not there any more, unless a run may be at it."""
-        if any(Path(".snakemake/locks").glob("*")):
-            return
+        """Removes what says that a scene is rendered which is not there any more; not while a run may be at it."""
         for scene in self.to_render:
             stamps = Path(self.results) / "rendered"
             for stamp in (stamps / f"{scene}.txt", *(stamps / scene).glob("*")):

@@ -10,6 +10,7 @@ import click
 from ... import __version__
 from ...common import extras, plugins
 from ...common.errors import UserError
+from .. import _follow
 
 PACKAGE = "workflow.commands"
 
@@ -45,7 +46,10 @@ def group() -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Runs one command and returns the exit status: 0 or the command's, 2 for a user's mistake, 130 when stopped."""
     signal.signal(signal.SIGTERM, _stop)  # so that temporary files are removed on the way out
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) == signal.SIG_DFL:  # and not under nohup
+        signal.signal(signal.SIGHUP, _stop)
     try:
+        _follow.follow()
         status = group.main(arguments, prog_name="viewbench", standalone_mode=False)
         sys.stdout.flush()
     except UserError as error:

@@ -46,7 +46,7 @@ def command(context: click.Context, study: str, out: Path, jobs: int | None, opt
     from ...common import settings as settings_file
     from ...common.errors import UserError
     from ...scenes.whereabouts import absence
-    from .. import _study
+    from .. import _alone, _study
 
     extras.need(*NEEDED, use="running a study needs", extra="study")
     settings = settings_file.load()
@@ -54,6 +54,7 @@ def command(context: click.Context, study: str, out: Path, jobs: int | None, opt
     name, absent = loaded.name, absence(loaded.scenes, settings, study=True)
     if absent:
         raise UserError(absent)
+    _alone.refused(out / "results" / name)
     out.mkdir(parents=True, exist_ok=True)
     status = _wait(subprocess.Popen(arguments(study, out, jobs, options), env=environment(settings)))
     page = out / "results" / name / "reports" / "index.html"
