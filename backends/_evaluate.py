@@ -76,6 +76,8 @@ def evaluate(
             return {
                 "name": name,
                 "file": f"renders/{file}",
+                "bytes": (temporary / file).stat().st_size,
+                "sha256": sha256_file(temporary / file),
                 "psnr_db": finite_or_none(psnr_db(rendered, truth)),
                 "ssim": finite_or_none(ssim(rendered, truth)),
                 "lpips": None if weights is None else lpips(rendered, truth, weights),

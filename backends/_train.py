@@ -116,6 +116,7 @@ def train(
             shutil.rmtree(work, ignore_errors=True)
             raise UserError(f"backend '{job.backend}' left a file '{taken}', a name of viewbench's own; rename it")
         record = _record(trained, asked, selection, sha256_folder(work / "model"))
+        record["bytes"] = {name: (work / "model" / name).stat().st_size for name in record["files"]}
         record["gpu"] = None if lease is None else lease.record()
         _replace_model(work / "model", out)
         write_json(out / "selection.json", sealed(selection))

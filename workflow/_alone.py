@@ -18,6 +18,7 @@ from typing import Any
 
 from ..common import holding
 from ..common.errors import UserError
+from . import _clock
 
 FILE = ".run.json"
 SIGN_S = 30.0  # between two signs of life: the file's time is set
@@ -164,7 +165,12 @@ def _remove_locks(results: Path) -> None:
 
 
 def _show_life(path: Path) -> None:
+    watch, shown = _clock.Watch(), time.monotonic()
     while path in _held:
-        time.sleep(SIGN_S)
+        time.sleep(1)
         with contextlib.suppress(OSError, KeyError):
-            os.utime(_held[path])
+            if watch.went_back():
+                _clock.settle(path.parent)
+            if time.monotonic() - shown > SIGN_S:
+                shown = time.monotonic()
+                os.utime(_held[path])
