@@ -115,13 +115,13 @@ def load_user_features(path: Path, n: int) -> np.ndarray:
     """
     try:
         content = Path(path).read_bytes()
+        if altered(content):
+            raise UserError(f"features '{path}' were altered since they were written; delete that file and embed again")
         array: Any = np.load(io.BytesIO(content), allow_pickle=False)
     except OSError as error:
         raise UserError(f"features '{path}' cannot be read: {error.strerror or error}") from None
     except (ValueError, EOFError):
         raise UserError(f"features '{path}' are not a .npy file of numbers; write them with numpy.save") from None
-    if altered(content):
-        raise UserError(f"features '{path}' were altered since they were written; delete that file and embed again")
     if getattr(array, "ndim", 0) != 2 or array.dtype.kind not in "fiu" or len(array) != n:
         found = f"{array.dtype} of shape {array.shape}" if isinstance(array, np.ndarray) else "several arrays"
         raise UserError(f"features '{path}' are {found}, expected numbers with one row for each of {n} training views")

@@ -4,8 +4,8 @@
 
 Kills are SIGKILL at random moments: of Snakemake, of a job (the `viewbench` that Snakemake started or the process that
 the fork server made for it), of the fork server, of the writer to MLflow, of MLflow's server, of the whole process
-group. After each the user's command is given again, at once or when everything is quiet. Prints counts, and ends with
-status 1 where something is not as in an undisturbed run.
+group; and what a terminal does: Ctrl-C, and closing it. After each the user's command is given again, at once or when
+everything is quiet. Prints counts, and ends with status 1 where something is not as in an undisturbed run.
 """
 
 import argparse
@@ -48,9 +48,12 @@ holdout = "every:4"
 [features]
 cache = "results/features"
 """
-CELLS = 12
-KINDS = ("snakemake", "group", "select", "train", "evaluate", "forked job", "fork server", "track", "mlflow server")
-WEIGHTS = (3, 3, 2, 3, 3, 3, 1, 2, 1)
+SMALL = {"[uniform, maxmin, logdet]": "[uniform, maxmin]", "seeds: [0, 1]": "seeds: [0]"}
+OF_GROUP = {"group": signal.SIGKILL, "Ctrl-C": signal.SIGINT, "hang-up": signal.SIGHUP}
+KINDS = {  # and how often each is tried
+    **{"snakemake": 3, "group": 2, "Ctrl-C": 1, "hang-up": 1, "select": 2, "train": 3, "evaluate": 3},
+    **{"forked job": 3, "fork server": 1, "track": 2, "mlflow server": 1},
+}
 QUIET_S = 60.0  # in which the jobs of a killed run must be gone
 FIND_S = 6.0  # in which a process of a kind may come
 RUN_S = 600.0
@@ -79,16 +82,21 @@ def main() -> int:
 class Soak:
     """A study without disturbance, and the same under kills, round after round."""
 
-    def __init__(self, folder: Path, random: random.Random):
+    def __init__(self, folder: Path, random: random.Random, small: bool = False):
         self.random = random
-        self.clone = Clone(folder / "killed", STUDY)
+        study = STUDY
+        for old, new in SMALL.items() if small else ():
+            study = study.replace(old, new)
+        self.cells = 4 if small else 12
+        self.clone = Clone(folder / "killed", study)
         walk = take_frames(ROOM, folder / "walk", 24)
         (self.clone.folder / "environment.toml").write_text(SETTINGS.format(walk=str(walk)), encoding="utf-8")
         self.quiet = self.clone.copied(folder / "quiet")
         self.log = folder / "said.txt"
         self.kills: Counter = Counter()
         self.faults: list[str] = []
-        self.rounds = self.resumes = self.looked = self.swept = 0
+        self.script: list[str] = []  # kinds of kills to come; at random when it is empty
+        self.rounds = self.resumes = self.looked = 0
         self.per_cell: Counter = Counter()
         self.differences = 0
 
@@ -96,7 +104,7 @@ class Soak:
         """Rounds until so many kills were made."""
         self.quiet.run()
         expected = soak_checks.content(self.quiet.results)
-        assert sum(name.endswith("metrics.json") for name in expected) == CELLS
+        assert sum(name.endswith("metrics.json") for name in expected) == self.cells
         while sum(self.kills.values()) < kills and not self.faults:
             left = kills - sum(self.kills.values())
             self.round(min(left, self.random.randint(8, 14)), self.rounds % 2 == 1, self.rounds % 3 == 2)
@@ -152,7 +160,7 @@ class Soak:
         """Every cell has one run, and that is finished."""
         found = soak_checks.runs(uri, "mini")
         self.per_cell.update(Counter(f"{count} {status}" for (_, status), count in found.items()))
-        if len(found) != CELLS or set(found.values()) != {1} or {status for _, status in found} != {"FINISHED"}:
+        if len(found) != self.cells or set(found.values()) != {1} or {status for _, status in found} != {"FINISHED"}:
             self.faults.append(f"runs in MLflow: {dict(found)}")
 
     def start(self, variables: dict[str, str]) -> subprocess.Popen:
@@ -168,6 +176,7 @@ class Soak:
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
+                preexec_fn=usual,
             )
 
     def disturb(self, run: subprocess.Popen, kills: int, tracker: "Tracker | None") -> bool:
@@ -184,7 +193,7 @@ class Soak:
             if self.to_go == 0:
                 time.sleep(0.1)
                 continue
-            kind = self.random.choices(KINDS, WEIGHTS)[0]
+            kind = self.script.pop(0) if self.script else self.random.choices(list(KINDS), list(KINDS.values()))[0]
             # At a random moment of the run, and where it is of a job, of that; another kind where none comes.
             time.sleep(self.random.uniform(0, 3))
             until_found = time.monotonic() + FIND_S
@@ -192,6 +201,8 @@ class Soak:
                 if self.kill(kind, run, tracker):
                     self.kills[kind] += 1
                     self.to_go -= 1
+                    with open(self.log, "a", encoding="utf-8") as log:
+                        log.write(f"--- killed: {kind}\n")
                     break
                 time.sleep(0.02)
         text = (self.clone.results / "tracked.json").read_text() if run.returncode == 0 else "skipped"
@@ -206,8 +217,10 @@ class Soak:
         if kind == "snakemake":
             run.kill()
             return True
-        if kind == "group":
-            os.killpg(run.pid, signal.SIGKILL)
+        if kind in OF_GROUP:
+            if kind != "group" and not self._jobs(run):
+                return False  # stopped before its jobs it is stopped as any program
+            os.killpg(run.pid, OF_GROUP[kind])
             return True
         found = {pid: of for pid, of in soak_checks.processes(run.pid).items() if is_of(kind, *of, run)}
         if not found:
@@ -222,12 +235,16 @@ class Soak:
             return False
         return True
 
+    def _jobs(self, run: subprocess.Popen) -> bool:
+        lines = [line for _, line in soak_checks.processes(run.pid).values()]
+        return any("/viewbench " in line and "_fork_server" not in line for line in lines)
+
     def report(self) -> str:
         """The counts, in one line."""
         kinds = ", ".join(f"{self.kills[kind]} {kind}" for kind in KINDS if self.kills[kind])
         cells = ", ".join(f"{count} cells with {what}" for what, count in self.per_cell.items())
         return (
-            f"{sum(self.kills.values())} kills ({kinds}), {self.resumes} resumes, {self.rounds} rounds of {CELLS} "
+            f"{sum(self.kills.values())} kills ({kinds}), {self.resumes} resumes, {self.rounds} rounds of {self.cells} "
             f"cells, {self.looked} files looked at as they appeared, {self.differences} differences, MLflow: {cells}, "
             f"{len(self.faults)} faults"
         )
@@ -238,6 +255,12 @@ def is_of(kind: str, parent: int, line: str, run: subprocess.Popen) -> bool:
     if "_fork_server" in line:
         return kind == ("fork server" if parent == run.pid else "forked job")
     return "viewbench" in line and f" {kind} " in line and not line.startswith(("/bin/bash", "bash", "/bin/sh"))
+
+
+def usual() -> None:
+    """As a terminal starts a program, and not as a shell's background does."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 class Tracker:

@@ -53,7 +53,8 @@ def plainly(stop: Any = lambda: None) -> Iterator[None]:
 
 def _sentence(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.strerror}: '{error.filename}'" if error.filename else error.strerror
+        where = f": '{error.filename}'" if error.filename else ""
+        return f"{error.strerror}{where}; see to that, and run the same command again"
     return str(error)
 
 

@@ -18,6 +18,7 @@ from typing import Any
 from ._pace import Pace
 
 TICK_S = 1.0  # between two drawings on a terminal
+LITTLE = 1 << 20  # bytes of free space in which no job can be done
 LINE_S = 20.0  # between two lines elsewhere
 BAR = 20  # characters
 
@@ -86,7 +87,7 @@ class Progress(logging.Handler):
             return
         self.failures.add(output)
         self._clear()
-        print(f"failed: {rule} of {output}: {words or 'see its log'}", file=self.stream, flush=True)
+        print(f"failed: {rule} of {output}: {words or _no_room() or 'see its log'}", file=self.stream, flush=True)
 
     @property
     def done(self) -> int:
@@ -196,6 +197,13 @@ def salvage(study: Any, given: str) -> None:
         ["report", str(results)],
     ):
         subprocess.run([sys.executable, "-m", "viewbench", *arguments], check=False)
+
+
+def _no_room() -> str:
+    """Why a job that failed may have said nothing: its log had no room either."""
+    with contextlib.suppress(OSError):
+        return "no space is left in results/" if shutil.disk_usage("results").free < LITTLE else ""
+    return ""
 
 
 def last_line(logs: list[str]) -> str:

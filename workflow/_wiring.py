@@ -219,6 +219,10 @@ class Wiring:
         """Every file of selections."""
         return sorted({self.selection(_Cell(cell)) for cell in self.cells})
 
+    def features_patterns(self) -> list[str]:
+        """Every file of features that a selection uses."""
+        return sorted({path for cell in self.cells for path in self.features(_Cell(cell))})
+
     def selector_options(self, wildcards: Any) -> str:
         """Options of `viewbench select` for the selector."""
         entry = self.study.selector(wildcards.selector)

@@ -1,6 +1,7 @@
 """The command group: finds commands by file, imports the one that is called, and turns errors into one line."""
 
 import difflib
+import errno
 import os
 import signal
 import sys
@@ -13,6 +14,7 @@ from ...common.errors import UserError
 from .. import _follow
 
 PACKAGE = "workflow.commands"
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class Commands(click.Group):
@@ -70,6 +72,8 @@ def run(arguments: list[str] | None = None) -> int:
     except OSError as error:
         if error.errno is None:
             raise
+        if error.errno in FULL:
+            return _fail(f"{error.strerror}; make room for what is written, and run the same command again")
         return _fail(f"{error.strerror}: '{error.filename}'" if error.filename else str(error.strerror))
     return status or 0
 
