@@ -49,7 +49,8 @@ with alone(Path("cell")):
 
 
 def aged(path: Path, seconds: float) -> Path:
-    os.utime(path, (time.time() - seconds,) * 2)
+    date = time.time() - seconds
+    os.utime(path, (date, date))
     return path
 
 
