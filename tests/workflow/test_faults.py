@@ -148,6 +148,29 @@ def test_a_table_without_its_hash_has_whole_rows(made, results):
     assert heal(made[0], results) == [results / "results.csv"]
 
 
+def test_a_cell_that_was_not_come_to_has_not_failed(made, results, monkeypatch):
+    """Its steps have not begun, or were stopped with the run; one that says why it ended has failed."""
+    monkeypatch.chdir(made[1].parents[1])
+    settings = settings_file.load()
+
+    def status() -> str:
+        (row,) = collect(made[0], results, settings, partial=True)
+        return row["status"]
+
+    assert status() == "ok"
+    (results / CELL / "metrics.json").unlink()
+    assert status() == "not run yet"
+    log = results / "logs" / "train" / "splat" / "walk" / "uniform" / "0.3" / "0.log"
+    log.parent.mkdir(parents=True)
+    for words, expected in {
+        "viewbench: stopped": "not run yet",
+        "no luck": "train: no luck",
+        "": "not run yet",
+    }.items():
+        log.write_text(f"{words}\n", encoding="utf-8")
+        assert status() == expected
+
+
 def test_a_row_of_the_cache_that_was_altered_is_embedded_again(tmp_path):
     file = tmp_path / "row.npy"
     features.save(file, np.arange(4.0))
