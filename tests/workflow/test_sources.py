@@ -93,7 +93,7 @@ print(*[name for name in sys.modules if name.startswith("viewbench.")], file=sys
         "workflow.commands._main",
         "workflow._follow",
         "common.extras",
-    }  # how errors are said, and who stops it
+    }  # errors, and stopping
     assert {name for name in undeclared if not name.startswith("scenes.formats.")} <= no_matter
 
 
