@@ -11,12 +11,13 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server test-slurm
+.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server test-slurm soak
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
 	@echo "make dashboard   MLflow over the runs just made, on http://127.0.0.1:5000"
 	@echo "make test        linters, type checks and tests"
+	@echo "make soak        a study that is killed 60 times at random moments (half an hour; SOAK='--kills N --seed S')"
 	@echo "make bench       timings, as ratios measured side by side"
 	@echo "make gpu         what needs a GPU, tried and recorded (10 minutes; GPU=--real for a capture too)"
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
@@ -87,6 +88,10 @@ bench: dev
 gpu:
 	@if nvidia-smi -L > /dev/null 2>&1; then $(MAKE) dev && $(BIN)/python -m tests.gpu $(GPU); \
 	else echo "No GPU is in reach (nvidia-smi names none), so nothing was tried: gsplat and instant-ngp are as unproven here as before."; fi
+
+# A small study, killed at random 60 times and more, ends as one that was left alone (half an hour).
+soak: dev
+	$(THREADS) $(BIN)/python -m tests.soak $(SOAK)
 
 quality: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_quality.py $(BENCH)

@@ -13,6 +13,7 @@ from .. import __version__
 from ..common import gpu, plugins, threads
 from ..common.errors import UserError
 from ..common.files import finite_or_none, read_json, sealed, sha256_file, unsealed, write_json
+from ..common.holding import alone
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
@@ -36,8 +37,7 @@ def evaluate(
 
     Scores are of the 8-bit pictures that are written, so that anyone can repeat them from the files.
     Raises UserError when the model is missing or was altered, was trained on another scene or on this one when it was
-    different (another hold-out may have trained on what is scored now), or the scene has no test split; PassingError
-    where memory was short.
+    different (another hold-out may have trained on what is scored now), or the scene has no test split.
     """
     train = read_json(model / "train.json", "training record")
     if not isinstance(train, dict) or not isinstance(train.get("files"), dict):
@@ -60,54 +60,57 @@ def evaluate(
     indices = np.arange(len(scene.test))
     truths, cameras = read_images(scene.test, indices, train["width"])
     weights = lpips_weights(settings.metrics.lpips_weights)
-    renders = out / "renders"
-    temporary = out / ".renders"
-    shutil.rmtree(temporary, ignore_errors=True)
-    temporary.mkdir(parents=True)
-
-    def scored(drawn: tuple[int, tuple[str, Picture, np.ndarray]]) -> dict[str, Any]:
-        number, (name, picture, image) = drawn
-        truth = picture.pixels()
-        pixels = to_uint8(image, truth.shape, name)
-        file = picture_name(number, name)
-        save_png(pixels, temporary / file)
-        rendered = pixels.astype(np.float32) / 255
-        return {
-            "name": name,
-            "file": f"renders/{file}",
-            "psnr_db": finite_or_none(psnr_db(rendered, truth)),
-            "ssim": finite_or_none(ssim(rendered, truth)),
-            "lpips": None if weights is None else lpips(rendered, truth, weights),
-        }
-
-    views: list[dict[str, Any]] = []
-    try:
-        drawn = zip(scene.test.names, truths, backend.render(model, cameras), strict=True)
-        with _passing.named(f"backend '{train['backend']}'", f"{len(indices)} views to render"):
-            for view in threads.over(scored, enumerate(drawn)):
-                views.append(view)
-                progress(len(views), len(scene.test), "")
-        shutil.rmtree(renders, ignore_errors=True)
-        temporary.replace(renders)
-    finally:
+    with alone(out):
+        renders = out / "renders"
+        temporary = out / ".renders"
         shutil.rmtree(temporary, ignore_errors=True)
-    record = {
-        "schema": 1,
-        **{metric: _mean([view[metric] for view in views]) for metric in ("psnr_db", "ssim", "lpips")},
-        "seconds": time.perf_counter() - began,
-        "views": views,
-        "scene_sha256": scene_hash,
-        "holdout": scene.holdout,
-        "train_sha256": sha256_file(model / "train.json"),
-        "lpips_sha256": lpips_sha256(settings.metrics.lpips_weights),
-        "code_sha256": code,
-        "configuration": _registry.configuration_of(backend)["render"],
-        "drawn_by": _registry.drawn_by(train["backend"], backend),
-        "viewbench": __version__,
-    }
-    record = sealed(record)
-    write_json(out / "metrics.json", record)
-    return record
+        temporary.mkdir(parents=True)
+
+        def scored(drawn: tuple[int, tuple[str, Picture, np.ndarray]]) -> dict[str, Any]:
+            number, (name, picture, image) = drawn
+            truth = picture.pixels()
+            pixels = to_uint8(image, truth.shape, name)
+            file = picture_name(number, name)
+            save_png(pixels, temporary / file)
+            rendered = pixels.astype(np.float32) / 255
+            return {
+                "name": name,
+                "file": f"renders/{file}",
+                "bytes": (temporary / file).stat().st_size,
+                "sha256": sha256_file(temporary / file),
+                "psnr_db": finite_or_none(psnr_db(rendered, truth)),
+                "ssim": finite_or_none(ssim(rendered, truth)),
+                "lpips": None if weights is None else lpips(rendered, truth, weights),
+            }
+
+        views: list[dict[str, Any]] = []
+        try:
+            drawn = zip(scene.test.names, truths, backend.render(model, cameras), strict=True)
+            with _passing.named(f"backend '{train['backend']}'", f"{len(indices)} views to render"):
+                for view in threads.over(scored, enumerate(drawn)):
+                    views.append(view)
+                    progress(len(views), len(scene.test), "")
+            shutil.rmtree(renders, ignore_errors=True)
+            temporary.replace(renders)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+        record = {
+            "schema": 1,
+            **{metric: _mean([view[metric] for view in views]) for metric in ("psnr_db", "ssim", "lpips")},
+            "seconds": time.perf_counter() - began,
+            "views": views,
+            "scene_sha256": scene_hash,
+            "holdout": scene.holdout,
+            "train_sha256": sha256_file(model / "train.json"),
+            "lpips_sha256": lpips_sha256(settings.metrics.lpips_weights),
+            "code_sha256": code,
+            "configuration": _registry.configuration_of(backend)["render"],
+            "drawn_by": _registry.drawn_by(train["backend"], backend),
+            "viewbench": __version__,
+        }
+        record = sealed(record)
+        write_json(out / "metrics.json", record)
+        return record
 
 
 def check_model(model: Path, train: dict[str, Any], scene: Scene, scene_hash: str) -> None:

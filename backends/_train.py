@@ -17,6 +17,7 @@ from .. import __version__
 from ..common import plugins, threads
 from ..common.errors import PassingError, UserError, nearest
 from ..common.files import read_json, sealed, sha256_folder, write_json
+from ..common.holding import alone
 from ..common.provenance import commit, machine
 from ..common.rng import seed_of
 from ..common.settings import Settings
@@ -51,7 +52,8 @@ def train(
 
     The files of the model appear in `out` only when all of them are written, `train.json` last. Raises UserError for
     a backend that is unavailable or unknown, an option that it does not have, a selection that does not fit the
-    scene, and whatever the backend refuses; PassingError where memory was short.
+    scene, a folder that another process is writing, and whatever the backend refuses; PassingError
+    where memory was short.
     """
     threads.allow(settings.compute.threads)
     backend = _registry.load(job.backend, settings)
@@ -84,39 +86,45 @@ def train(
         "version": backend.version(),
         "configuration": _registry.configuration_of(backend)["train"],
     }
-    work = _work_folder(out, asked, resumes=backend.CAPABILITIES.resumes)
-    try:
-        report = Report(progress=progress, probe=_probe(scene, job.width) if job.curve and len(scene.test) else None)
-        with Pictures(read, (int(cameras.height[0]), int(cameras.width[0]), 3), work, KEPT_BYTES) as images:
-            data = TrainingSet(
-                scene=scene.name,
-                names=views.names,
-                cameras=cameras,
-                images=images,
-                points=scene.points,
-                chosen=indices,
-                training=pinholes(scene.train.cameras if job.width is None else scene.train.cameras.scaled(job.width)),
+    with alone(out):
+        work = _work_folder(out, asked, resumes=backend.CAPABILITIES.resumes)
+        try:
+            report = Report(
+                progress=progress, probe=_probe(scene, job.width) if job.curve and len(scene.test) else None
             )
-            with _passing.named(f"backend '{job.backend}'", f"{len(indices)} views"):
-                trained = backend.train(data, work / "model", cell_seed, job.budget, options, report)
-    except UserError as error:
-        for log in (work / "model").glob("*.log"):
-            log.replace(out / log.name)  # what an external program said outlives its failure
-        if not (backend.CAPABILITIES.resumes and isinstance(error, PassingError)):  # else the next attempt goes on
+            with Pictures(read, (int(cameras.height[0]), int(cameras.width[0]), 3), work, KEPT_BYTES) as images:
+                data = TrainingSet(
+                    scene=scene.name,
+                    names=views.names,
+                    cameras=cameras,
+                    images=images,
+                    points=scene.points,
+                    chosen=indices,
+                    training=pinholes(
+                        scene.train.cameras if job.width is None else scene.train.cameras.scaled(job.width)
+                    ),
+                )
+                with _passing.named(f"backend '{job.backend}'", f"{len(indices)} views"):
+                    trained = backend.train(data, work / "model", cell_seed, job.budget, options, report)
+        except UserError as error:
+            for log in (work / "model").glob("*.log"):
+                log.replace(out / log.name)  # what an external program said outlives its failure
+            if not (backend.CAPABILITIES.resumes and isinstance(error, PassingError)):  # else the next attempt goes on
+                shutil.rmtree(work, ignore_errors=True)
+            raise
+        taken = next((file.name for file in (work / "model").iterdir() if file.name in OURS), None)
+        if taken is not None:
             shutil.rmtree(work, ignore_errors=True)
-        raise
-    taken = next((file.name for file in (work / "model").iterdir() if file.name in OURS), None)
-    if taken is not None:
+            raise UserError(f"backend '{job.backend}' left a file '{taken}', a name of viewbench's own; rename it")
+        record = _record(trained, asked, selection, sha256_folder(work / "model"))
+        record["bytes"] = {name: (work / "model" / name).stat().st_size for name in record["files"]}
+        record["gpu"] = None if lease is None else lease.record()
+        _replace_model(work / "model", out)
+        write_json(out / "selection.json", sealed(selection))
+        record = sealed(record)
+        write_json(out / "train.json", record)
         shutil.rmtree(work, ignore_errors=True)
-        raise UserError(f"backend '{job.backend}' left a file '{taken}', a name of viewbench's own; rename it")
-    record = _record(trained, asked, selection, sha256_folder(work / "model"))
-    record["gpu"] = None if lease is None else lease.record()
-    _replace_model(work / "model", out)
-    write_json(out / "selection.json", sealed(selection))
-    record = sealed(record)
-    write_json(out / "train.json", record)
-    shutil.rmtree(work, ignore_errors=True)
-    return record
+        return record
 
 
 def all_options(backend: str, known: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from . import holding
 from .errors import UserError
 
 SEAL = "content_sha256"  # of a JSON record: the hash of all the rest of it
@@ -20,13 +21,16 @@ SEAL = "content_sha256"  # of a JSON record: the hash of all the rest of it
 def whole(path: str | os.PathLike) -> Iterator[Path]:
     """Yields a temporary path in the same folder, renamed to `path` on success and removed on failure.
 
-    The temporary name keeps the suffix of `path`, so that writers which look at it do the right thing.
+    The temporary name keeps the suffix of `path`, so that writers which look at it do the right thing. What a writer
+    that was killed left is removed by `holding.sweep`.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=".part-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
+    handle, name = tempfile.mkstemp(prefix=holding.prefix(), suffix=path.suffix, dir=path.parent)
     temporary = Path(name)
+    held = holding.lock(handle)
+    if not held:  # Windows renames no open file
+        os.close(handle)
     try:
         yield temporary
         umask = os.umask(0)
@@ -34,6 +38,8 @@ def whole(path: str | os.PathLike) -> Iterator[Path]:
         temporary.chmod(0o666 & ~umask)
         temporary.replace(path)
     finally:
+        if held:
+            os.close(handle)
         temporary.unlink(missing_ok=True)
 
 
@@ -45,9 +51,10 @@ def whole_folder(path: str | os.PathLike) -> Iterator[Path]:
     """
     path = Path(os.path.realpath(path))
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=".part-", dir=path.parent))
+    temporary = Path(tempfile.mkdtemp(prefix=holding.prefix(), dir=path.parent))
     try:
-        yield temporary
+        with holding.kept(temporary):
+            yield temporary
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o777 & ~umask)

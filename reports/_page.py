@@ -14,7 +14,7 @@ from ..common.files import read_json, write_text
 from ..common.provenance import machine
 from . import _findings, _items, _rooms, _study
 from ._items import Item
-from ._study import OK, Study, and_list, counted, in_order, percent, selector_words
+from ._study import OK, Study, and_list, counted, in_order, missing_words, percent, selector_words
 
 TEMPLATES = Path(__file__).parent / "templates"
 HEAVY_BYTES = 300_000  # a larger PNG goes into the page as WebP; the PNG itself stays beside the page
@@ -119,8 +119,7 @@ def _facts(study: Study) -> list[tuple[str, str]]:
         ("Image encoder", study.record.get("encoder", "")),
         (
             "Cells",
-            f"{len(study.done)} of {len(study.cells)} scored"
-            + (f", {len(study.failed)} failed" if study.failed else ""),
+            f"{len(study.done)} of {len(study.cells)} scored" + (f", {missing_words(study)}" if study.failed else ""),
         ),
         ("Trained on", "; ".join(devices)),
         ("Page made on", f"{here['cpu']}, {here['cpus']} CPUs, {here['system']}, Python {here['python']}"),

@@ -13,6 +13,7 @@ from ..common.files import read_json
 
 FULL = "full"  # the selector name of the full-data reference
 OK = "ok"
+NOT_RUN = "not run yet"  # the study was stopped before it came to the cell
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Cell:
     commit: str
     scene_sha256: str
     viewbench: str
-    status: str  # "ok", or what went wrong
+    status: str  # "ok", "not run yet", or what went wrong
     folder: Path  # of selection.json, train.json, metrics.json and renders/
 
     @property
@@ -242,7 +243,14 @@ def selector_words(entry: dict[str, Any]) -> str:
 
 def failures_note(study: Study) -> str:
     """A sentence for captions when cells are missing; empty otherwise."""
-    return f" Left out: {len(study.failed)} of {len(study.cells)} cells, which failed." if study.failed else ""
+    return f" Left out of {len(study.cells)} cells: {missing_words(study)}." if study.failed else ""
+
+
+def missing_words(study: Study) -> str:
+    """How many cells failed and how many were not run yet, without those that are none."""
+    unrun = sum(cell.status == NOT_RUN for cell in study.failed)
+    words = ((len(study.failed) - unrun, "failed"), (unrun, "not run yet"))
+    return " and ".join(f"{count} {what}" for count, what in words if count)
 
 
 def _cell(row: dict[str, str], folder: Path) -> Cell:

@@ -5,6 +5,7 @@ what its features depend on besides the pictures, `encoder(argument, device)` lo
 """
 
 import hashlib
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from .orientation import upright
 from .types import Split
 
 ENCODERS = "scenes.encoders"
+MARK = b"viewbench sha256"  # behind an array that `save` wrote, before its hash
 DECODING = "upright, squeezed to a square, bicubic"  # part of what the cache is named by
 
 Progress = Callable[[int, int | None, str], None]
@@ -98,9 +100,20 @@ def of_encoder(encoder: str) -> dict[str, str]:
 
 
 def save(path: Path, array: np.ndarray) -> None:
-    """Writes an array as float32 .npy, whole or not at all."""
+    """Writes an array as float32 .npy, whole or not at all; behind it, where no reader looks, the hash of it."""
     with whole(path) as temporary:
         np.save(temporary, array.astype(np.float32))
+        digest = hashlib.sha256(temporary.read_bytes()).digest()
+        with open(temporary, "ab") as file:
+            file.write(MARK + digest)
+
+
+def altered(content: bytes) -> bool:
+    """Whether the content of a file that `save` wrote is not what it wrote; files of others have no hash, and are
+    taken as they are."""
+    start = len(content) - hashlib.sha256().digest_size
+    bare, mark = content[: start - len(MARK)], content[start - len(MARK) : start]
+    return start > len(MARK) and mark == MARK and hashlib.sha256(bare).digest() != content[start:]
 
 
 def load_user_features(path: Path, n: int) -> np.ndarray:
@@ -109,7 +122,10 @@ def load_user_features(path: Path, n: int) -> np.ndarray:
     Raises UserError for a file that is none, has another number of rows than `n`, or NaN in some row.
     """
     try:
-        array: Any = np.load(path, allow_pickle=False)
+        content = Path(path).read_bytes()
+        if altered(content):
+            raise UserError(f"features '{path}' were altered since they were written; delete that file and embed again")
+        array: Any = np.load(io.BytesIO(content), allow_pickle=False)
     except OSError as error:
         raise UserError(f"features '{path}' cannot be read: {error.strerror or error}") from None
     except (ValueError, EOFError):
@@ -154,6 +170,7 @@ def picture(path: Path, size: int) -> np.ndarray:
 def cached(file: Path) -> np.ndarray | None:
     """The row in the cache, or None where there is none or it is damaged."""
     try:
-        return np.load(file, allow_pickle=False)
+        content = file.read_bytes()
+        return None if altered(content) else np.load(io.BytesIO(content), allow_pickle=False)
     except (OSError, ValueError, EOFError):
         return None

@@ -7,11 +7,14 @@ from typing import Any
 from .. import __version__
 from ..common.cells import cell_folder, cell_name
 from ..common.errors import UserError
-from ..common.files import read_json, whole
+from ..common.files import read_json, sha256_file, whole, write_text
 from ..common.settings import Settings
+from ..reports._study import NOT_RUN
 from ._stale import Asked
 from ._study import Study
 
+TABLE_SEAL = ".results.csv.sha256"  # the hash of results.csv as it was written
+STOPPED = ("viewbench: stopped", "viewbench: the process that ran this is gone")
 COLUMNS = (
     "study",
     "dataset",
@@ -56,12 +59,15 @@ def collect(study: Study, results: Path, settings: Settings, partial: bool = Fal
         except UserError as error:
             if not partial:
                 raise
-            row["status"] = _last_words(results, cell, folder / "metrics.json") or str(error)
+            row["status"] = _last_words(results, cell, folder / "metrics.json") or (
+                str(error) if (folder / "metrics.json").is_file() else NOT_RUN
+            )
         rows.append(row)
     with whole(results / "results.csv") as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
+    write_text(results / TABLE_SEAL, sha256_file(results / "results.csv") + "\n")
     return rows
 
 
@@ -111,12 +117,13 @@ def _logs(results: Path, cell: dict[str, str]) -> dict[Path, str]:
 
 
 def _last_words(results: Path, cell: dict[str, str], score: Path) -> str:
-    """Last line of the newest of the cell's logs since it had a score: the step that failed wrote it."""
+    """Last line of the newest of the cell's logs since it had a score: the step that failed wrote it. A step that was
+    stopped with the run has not failed."""
     scored_at = score.stat().st_mtime_ns if score.is_file() else 0
     logs = {path: step for path, step in _logs(results, cell).items() if path.is_file()}
     logs = {path: step for path, step in logs.items() if path.stat().st_mtime_ns > scored_at}
     for path in sorted(logs, key=lambda path: path.stat().st_mtime_ns, reverse=True):
         lines = [line for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
-        if lines:
+        if lines and lines[-1] not in STOPPED:
             return f"{logs[path]}: {lines[-1]}"
     return ""

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..common.files import plain, write_text
 from ..common.sources import sources
+from ._alone import plainly
 
 
 class Lists:
@@ -42,8 +43,9 @@ class Lists:
             lines += [f"{name} = {json.dumps(plain(value), sort_keys=True)}" for name, value in (values or {}).items()]
             lines += [f"{package} {_version(package)}" for package in packages]
             text = "".join(f"{line}\n" for line in lines)
-            if not file.is_file() or file.read_text(encoding="utf-8") != text:
-                write_text(file, text)
+            with plainly():  # it is written while Snakemake plans, which would show where in the code that was
+                if not file.is_file() or file.read_text(encoding="utf-8") != text:
+                    write_text(file, text)
             self._made.add(step)
         return str(file)
 

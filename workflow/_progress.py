@@ -20,6 +20,7 @@ from ._pace import Pace, clock
 from ._progress_file import EVERY_S, RunFile
 
 TICK_S = 1.0  # between two drawings on a terminal
+LITTLE = 1 << 20  # bytes of free space in which no job can be done
 LINE_S = 20.0  # between two lines elsewhere
 BAR = 20  # characters
 
@@ -129,7 +130,7 @@ class Progress(logging.Handler):
             self.file.fail(output, rule, ended.wildcards if ended else {}, words, str(logs[-1]) if logs else "")
             self._tell(at_once=True)
         self._clear()
-        print(f"failed: {rule} of {output}: {words or 'see its log'}", file=self.stream, flush=True)
+        print(f"failed: {rule} of {output}: {words or _no_room() or 'see its log'}", file=self.stream, flush=True)
 
     @property
     def done(self) -> int:
@@ -242,10 +243,10 @@ def salvage(study: Any, given: str) -> None:
         subprocess.run([sys.executable, "-m", "viewbench", *arguments], check=False)
 
 
-<<<<<<< HEAD
 def _listed(record: logging.LogRecord, what: str) -> str:
     return ", ".join(getattr(record, what, []) or [])
-=======
+
+
 def said_by_scheduler(logs: list[str]) -> str:
     """Why a scheduler ended a job: the last line of Slurm's own in the logs; "" where there is none."""
     found = ""
@@ -255,7 +256,13 @@ def said_by_scheduler(logs: list[str]) -> str:
             lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
             found = next((line for line in reversed(lines) if line.startswith("slurmstepd")), found)
     return found
->>>>>>> slurm
+
+
+def _no_room() -> str:
+    """Why a job that failed may have said nothing: its log had no room either."""
+    with contextlib.suppress(OSError):
+        return "no space is left in results/" if shutil.disk_usage("results").free < LITTLE else ""
+    return ""
 
 
 def last_line(logs: list[str]) -> str:

@@ -123,9 +123,7 @@ class Wiring:
         return frozenset(renderable(self.study.scenes, self.settings) if renders(self.settings) else ())
 
     def forget_renders(self) -> None:
-        """Removes what says that a scene is rendered which is not there any more, unless a run may be at it."""
-        if any(Path(".snakemake/locks").glob("*")):
-            return
+        """Removes what says that a scene is rendered which is not there any more; not while a run may be at it."""
         for scene in self.to_render:
             stamps = Path(self.results) / "rendered"
             for stamp in (stamps / f"{scene}.txt", *(stamps / scene).glob("*")):
@@ -231,6 +229,10 @@ class Wiring:
     def selection_patterns(self) -> list[str]:
         """Every file of selections."""
         return sorted({self.selection(_Cell(cell)) for cell in self.cells})
+
+    def features_patterns(self) -> list[str]:
+        """Every file of features that a selection uses."""
+        return sorted({path for cell in self.cells for path in self.features(_Cell(cell))})
 
     def selector_options(self, wildcards: Any) -> str:
         """Options of `viewbench select` for the selector."""

@@ -1,6 +1,7 @@
 """The command group: finds commands by file, imports the one that is called, and turns errors into one line."""
 
 import difflib
+import errno
 import os
 import signal
 import sys
@@ -10,9 +11,11 @@ import click
 from ... import __version__
 from ...common import extras, plugins
 from ...common.errors import PassingError, UserError
+from .. import _follow
 from .._again import PASSING
 
 PACKAGE = "workflow.commands"
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class Commands(click.Group):
@@ -49,7 +52,10 @@ def run(arguments: list[str] | None = None) -> int:
     That is 0 or the command's, 2 for a user's mistake, 75 for what may work another time, 130 when stopped.
     """
     signal.signal(signal.SIGTERM, _stop)  # so that temporary files are removed on the way out
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) == signal.SIG_DFL:  # and not under nohup
+        signal.signal(signal.SIGHUP, _stop)
     try:
+        _follow.follow()
         status = group.main(arguments, prog_name="viewbench", standalone_mode=False)
         sys.stdout.flush()
     except PassingError as error:
@@ -72,6 +78,8 @@ def run(arguments: list[str] | None = None) -> int:
     except OSError as error:
         if error.errno is None:
             raise
+        if error.errno in FULL:
+            return _fail(f"{error.strerror}; make room for what is written, and run the same command again")
         return _fail(f"{error.strerror}: '{error.filename}'" if error.filename else str(error.strerror))
     return status or 0
 

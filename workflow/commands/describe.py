@@ -18,7 +18,7 @@ def command(scene: _options.Capture, out: Path, width: int | None) -> None:
     import numpy as np
 
     from ...common import settings as settings_file
-    from ...common.files import write_json
+    from ...common.files import sealed, write_json
     from ...scenes.digest import scene_sha256
     from ...scenes.seen import shares_of
     from ...scenes.types import Split
@@ -58,7 +58,7 @@ def command(scene: _options.Capture, out: Path, width: int | None) -> None:
         "points": points,
         "seen": shares_of(opened.root, opened.test.names),
     }
-    write_json(out, record)
+    write_json(out, sealed(record))
 
 
 def _write_truth(test, width: int, folder: Path) -> None:

@@ -28,9 +28,12 @@ READ = {
 @click.argument("study")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=".", help="Folder to run in.")
 @click.option("-j", "--jobs", type=click.IntRange(min=1), help="Jobs at once; one for each processor without it.")
+@click.option("--verify", is_flag=True, help="Read every model and render again, to find what was altered since.")
 @click.argument("options", nargs=-1, metavar="[-- OPTIONS OF SNAKEMAKE]")
 @click.pass_context
-def command(context: click.Context, study: str, out: Path, jobs: int | None, options: tuple[str, ...]) -> None:
+def command(
+    context: click.Context, study: str, out: Path, jobs: int | None, verify: bool, options: tuple[str, ...]
+) -> None:
     """Run STUDY, the name of one that ships or a file, and print where its page is.
 
     --out gets results/STUDY, as a clone does, with results/features and results/mlflow.db beside it; without it the
@@ -46,7 +49,7 @@ def command(context: click.Context, study: str, out: Path, jobs: int | None, opt
     from ...common import settings as settings_file
     from ...common.errors import UserError
     from ...scenes.whereabouts import absence
-    from .. import _study
+    from .. import _alone, _study
 
     extras.need(*NEEDED, use="running a study needs", extra="study")
     settings = settings_file.load()
@@ -54,15 +57,18 @@ def command(context: click.Context, study: str, out: Path, jobs: int | None, opt
     name, absent = loaded.name, absence(loaded.scenes, settings, study=True)
     if absent:
         raise UserError(absent)
+    _alone.refused(out / "results" / name)
     out.mkdir(parents=True, exist_ok=True)
-    status = _wait(subprocess.Popen(arguments(study, out, jobs, options), env=environment(settings)))
+    status = _wait(subprocess.Popen(arguments(study, out, jobs, options, verify), env=environment(settings)))
     page = out / "results" / name / "reports" / "index.html"
     if status == 0 and page.is_file():
         click.echo(page)
     context.exit(status)
 
 
-def arguments(study: str, out: Path, jobs: int | None, options: tuple[str, ...] = ()) -> list[str]:
+def arguments(
+    study: str, out: Path, jobs: int | None, options: tuple[str, ...] = (), verify: bool = False
+) -> list[str]:
     """The command line that runs the study in the folder `out`."""
     from ...common.settings import PACKAGE
 
@@ -71,10 +77,10 @@ def arguments(study: str, out: Path, jobs: int | None, options: tuple[str, ...] 
     command = [sys.executable, "-m", "snakemake", "--snakefile", PACKAGE / "Snakefile", "--workflow-profile", profile]
     command += ["--directory", out, "--cores", jobs or "all"]
     # Of several --config the last counts alone, and values are YAML, in which a path may hold " #" or ": ".
-    config = ["--config", f"study={json.dumps(given)}"]
+    config = ["--config", f"study={json.dumps(given)}", *(["verify=true"] if verify else [])]
     if "--config" in options:
         at = options.index("--config") + 1
-        options = (*options[:at], config[1], *options[at:])
+        options = (*options[:at], *config[1:], *options[at:])
         config = []
     return [str(part) for part in (*command, *options, *config)]
 
