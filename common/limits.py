@@ -33,6 +33,9 @@ PLY_BYTES = 1 << 32  # of the vertices: 17 million Gaussians of degree 3
 POINTS = 20_000_000
 ASCII_POINTS = 2_000_000
 COLMAP_BYTES = 1 << 32  # of all files of a model
+COLMAP_TEXT_BYTES = 1 << 30  # of one that is text
+COLMAP_LINE_BYTES = 1 << 26  # all the points that one image sees stand in a line
+COLMAP_POINTS = 5_000_000
 FEATURE_BYTES = 1 << 33  # a million rows of 1,152 numbers have 4.6 GB
 
 # Archives that are downloaded: pictures and depth come out at no more than a few times their size.
