@@ -131,12 +131,8 @@ def altered_file(model: Path, train: dict[str, Any]) -> str | None:
     One that lies outside the folder, by its name or through a link, is none of the model's.
     """
     for name, sha256 in train["files"].items():
-        if (
-            leaves(name)
-            or (model / name).is_symlink()
-            or not (model / name).is_file()
-            or sha256_file(model / name) != sha256
-        ):
+        file = model / name
+        if leaves(name) or file.is_symlink() or not file.is_file() or sha256_file(file) != sha256:
             return name
     return None
 

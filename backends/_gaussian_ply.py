@@ -69,7 +69,7 @@ def load(path: Path) -> Gaussians:
     """Reads what `save` or any 3DGS trainer wrote. Raises UserError for a file that is missing or has other fields."""
     try:
         vertex = vertices(path)
-        rest = sum(name.startswith("f_rest_") for name in vertex.dtype.names) // 3
+        rest = sum(name.startswith("f_rest_") for name in vertex.dtype.names or ()) // 3
         columns = np.stack([vertex[name] for name in fields(rest) if not name.startswith("n")], axis=1)
     except OSError as error:
         raise UserError(f"model '{path}' cannot be read: {error.strerror}; train it again") from None

@@ -187,7 +187,7 @@ def _replace_model(model: Path, out: Path) -> None:
     shutil.rmtree(out / "renders", ignore_errors=True)
     names = sorted(file.name for file in model.iterdir())
     before = read_json(out / LEFT, "list of files") if (out / LEFT).is_file() else []
-    mine = (name for name in before if isinstance(name, str) and name != ".." and Path(name).name == name)
+    mine = (name for name in before if isinstance(name, str) and name not in ("", "..") and Path(name).name == name)
     for name in {*names, *mine}:
         target = out / name
         if target.is_dir() and not target.is_symlink():

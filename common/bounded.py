@@ -92,5 +92,5 @@ def quoted(path: Path, text: str, most: int = 60) -> str:
 
 def in_words(count: int) -> str:
     """`134 MB` of a number of bytes."""
-    unit, size = next(((name, scale) for name, scale in (("GB", 1e9), ("MB", 1e6)) if count >= scale), ("bytes", 1))
+    unit, size = next((pair for pair in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)) if count >= pair[1]), ("bytes", 1))
     return f"{count / size:.3g} {unit}" if size > 1 else f"{count} {unit}"

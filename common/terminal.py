@@ -1,6 +1,7 @@
 """Lets no name of a capture give orders to the terminal that it is shown on: escape sequences are written out."""
 
 import contextlib
+import io
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -35,7 +36,7 @@ def guarded() -> Iterator[None]:
     sys.stderr = Shown(sys.stderr)
     if sys.stdout.isatty():
         sys.stdout = Shown(sys.stdout)
-    elif hasattr(sys.stdout, "reconfigure"):
+    elif isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="surrogateescape")
     try:
         yield

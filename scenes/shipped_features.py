@@ -25,8 +25,7 @@ def files(root: Path) -> tuple[Path, ...]:
 def write(root: Path, encoder: str, made_by: dict[str, Any], pictures: Sequence[str], rows: np.ndarray) -> Path:
     """Writes (N, D) rows of the N pictures, named by their SHA-256, as float16. Returns the .npy file."""
     folder = root / FOLDER
-    if folder.is_symlink():
-        raise UserError(f"'{folder}' is a link, and may lead anywhere; remove it")
+    check_place(root)
     folder.mkdir(exist_ok=True)
     file = folder / f"{encoder}.npy"
     with whole(file) as temporary, open(temporary, "wb") as opened:
@@ -34,6 +33,12 @@ def write(root: Path, encoder: str, made_by: dict[str, Any], pictures: Sequence[
     write_json(file.with_suffix(".json"), {"schema": 1, "encoder": encoder, **made_by, "pictures": list(pictures)})
     write_text(file.with_suffix(".sha256"), _sums(file))  # last: what a stopped run leaves is not taken
     return file
+
+
+def check_place(root: Path) -> None:
+    """Raises UserError where what is written into the capture would land elsewhere."""
+    if (root / FOLDER).is_symlink():
+        raise UserError(f"'{root / FOLDER}' is a link, and may lead anywhere; remove it")
 
 
 def read(root: Path, encoder: str, made_by: Callable[[], dict[str, Any]]) -> dict[str, np.ndarray]:

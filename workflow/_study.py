@@ -149,9 +149,11 @@ def load(study: str, settings: Settings) -> Study:
     try:
         bounded.checked(path)
         raw = yaml.safe_load(bounded.data(path, "study", limits.STUDY_BYTES).decode("utf-8"))
-    except OSError:
+    except FileNotFoundError:
         known = names()
         raise UserError(f"unknown study '{study}'{nearest(study, known)} (there are: {', '.join(known)})") from None
+    except OSError as error:
+        raise UserError(f"study '{path}' cannot be read: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         raise UserError(f"study '{path}' is not valid YAML: {error}") from None
     if _nodes(raw, {}) > limits.STUDY_NODES:

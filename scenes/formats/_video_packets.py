@@ -72,6 +72,9 @@ def opened(root: Path) -> Iterator[tuple[Any, Any]]:
 
     try:
         bounded.checked(root, limits.VIDEO_BYTES)
+    except OSError as error:
+        raise UserError(f"video '{root}' cannot be read: {error.strerror}") from None
+    try:
         # An absolute path: of "concat:a.mp4" FFmpeg would take the beginning for a protocol.
         with av.open(str(root.absolute()), metadata_errors="replace", options=OPENING) as container:
             stream = _film(container, root)

@@ -1,7 +1,6 @@
 """Options that several commands share, and the way they show progress."""
 
 import functools
-import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -100,10 +99,11 @@ class Capture:
         """Raises UserError where the settings of the current folder are part of the capture: whoever made that could
         name programs in them that are run, and folders that are written to."""
         from ...common.settings import FILE
+        from ...scenes.load import is_there
 
-        folder = Path(self.name)
-        if str(settings.source) != FILE or not os.path.exists(self.name):  # noqa: PTH110: of any text
+        if str(settings.source) != FILE or not is_there(self.name):
             return
+        folder = Path(self.name)
         folder = (folder if folder.is_dir() else folder.parent).resolve()
         if Path.cwd().resolve().is_relative_to(folder):
             raise UserError(
