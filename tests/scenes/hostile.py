@@ -788,9 +788,8 @@ def main() -> None:
         for name in sys.argv[1:] or list(ATTACKS):
             for row in outcomes([name], Path(folder)):
                 last = (row.err.strip().splitlines() or row.out.strip().splitlines() or [""])[-1]
-                print(
-                    f"{row.attack} | {row.command.split()[0]} | {row.status} | {row.seconds:.1f} s | {row.megabytes} MB | {last}"
-                )
+                facts = [row.attack, row.command.split()[0], row.status, f"{row.seconds:.1f} s", f"{row.megabytes} MB"]
+                print(*facts, last, sep=" | ")
 
 
 if __name__ == "__main__":
