@@ -407,6 +407,26 @@ def _(folder):
     picture(folder, png(32, 24, chunk(b"zTXt", b"Comment\0\0" + packed)))
 
 
+@attack("a PNG whose colour profile unpacks to 1 GB", "select {scene} --selector maxmin --count 2 --out {out}")
+def _(folder):
+    compressor = zlib.compressobj(9)
+    packed = b"".join(compressor.compress(bytes(1 << 20)) for _ in range(1024)) + compressor.flush()
+    picture(folder, png(32, 24, chunk(b"iCCP", b"profile\0\0" + packed)))
+
+
+@attack("photos whose EXIF is rubbish", "select {scene} --selector uniform --count 2 --out {out}", status=0)
+def _(folder):
+    from PIL import Image
+
+    walk(folder)
+    shutil.rmtree(folder / "images")
+    tags = struct.pack("<HHHII", 3, 0x0112, 3, 1 << 31, 1 << 31) + struct.pack("<HHII", 0x8769, 4, 1, 8)
+    tags += struct.pack("<HHII", 0x8825, 4, 1, 8) + struct.pack("<I", 8)  # directories in themselves
+    rubbish = b"Exif\0\0II*\0" + struct.pack("<I", 8) + tags
+    for i in range(3):
+        Image.new("RGB", (32, 24), (80 * i, 0, 0)).save(folder / f"{i}.jpg", exif=rubbish)
+
+
 @attack("PostScript as a JPEG, for Ghostscript", says="none of")
 def _(folder):
     script = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 32 24\n%%EndComments\n(pwned) (w) file closefile\n"
