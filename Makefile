@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server test-slurm soak
+.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server test-slurm soak hostile
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -23,6 +23,7 @@ help:
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
 	@echo "make size        seconds to 25 dB by size of the pictures, memory by number of views (10 minutes)"
 	@echo "make memory      peak memory of choosing, training and scoring by number of frames, up to 3,000 (10 minutes)"
+	@echo "make hostile     captures that mean harm: what each costs in seconds and memory (3 minutes)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make test-server a study logged to MLflow's server over PostgreSQL while both are killed (10 minutes; INSTALL=1: apt-get)"
 	@echo "make test-slurm  a study on a cluster of Slurm's, made and harmed here (root; INSTALL=1 installs Slurm; 20 minutes)"
@@ -84,6 +85,9 @@ bench: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_splat.py $(BENCH)
 	$(THREADS) $(BIN)/python tests/bench/bench_encoder.py $(BENCH)
 	$(THREADS) $(BIN)/python tests/bench/bench_threads.py $(BENCH)
+
+hostile: dev
+	$(THREADS) $(BIN)/python tests/scenes/hostile.py
 
 gpu:
 	@if nvidia-smi -L > /dev/null 2>&1; then $(MAKE) dev && $(BIN)/python -m tests.gpu $(GPU); \

@@ -17,6 +17,7 @@ from ..common.holding import alone
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
+from ..scenes.image_files import leaves
 from ..scenes.images import Picture, read_images
 from ..scenes.pictures import picture_name, save_png, to_uint8
 from ..scenes.types import Scene
@@ -40,7 +41,8 @@ def evaluate(
     different (another hold-out may have trained on what is scored now), or the scene has no test split.
     """
     train = read_json(model / "train.json", "training record")
-    if not isinstance(train, dict) or not isinstance(train.get("files"), dict):
+    kinds = {"files": dict, "backend": str, "width": int}
+    if not isinstance(train, dict) or not all(isinstance(train.get(key), kind) for key, kind in kinds.items()):
         raise UserError(f"'{model / 'train.json'}' is not what training writes; train again")
     train = unsealed(train, f"'{model / 'train.json'}'")
     if not len(scene.test):
@@ -129,9 +131,13 @@ def check_model(model: Path, train: dict[str, Any], scene: Scene, scene_hash: st
 
 
 def altered_file(model: Path, train: dict[str, Any]) -> str | None:
-    """Name of the first file of the model that is missing or not as `train` says; None where all are well."""
+    """Name of the first file of the model that is missing or not as `train` says; None where all are well.
+
+    One that lies outside the folder, by its name or through a link, is none of the model's.
+    """
     for name, sha256 in train["files"].items():
-        if not (model / name).is_file() or sha256_file(model / name) != sha256:
+        file = model / name
+        if leaves(name) or file.is_symlink() or not file.is_file() or sha256_file(file) != sha256:
             return name
     return None
 

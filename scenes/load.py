@@ -61,10 +61,14 @@ def _held_out(scene: Scene, given: str, listed: str, settings: Settings) -> Scen
     return hold_out(scene, rule)
 
 
+def is_there(name: str) -> bool:
+    """Whether there is a file or folder of this name, which unlike that of Path.exists may be any text."""
+    return os.path.exists(name)  # noqa: PTH110
+
+
 def _entry(name: str, settings: Settings) -> SceneEntry | None:
     """What environment.toml says of the name, or the catalogue unless the name is another folder's than the scene's."""
-    # os.path.exists, unlike Path.exists, takes any text for a name.
-    if name in settings.scenes or not os.path.exists(name):  # noqa: PTH110
+    if name in settings.scenes or not is_there(name):
         return settings.entry(name)
     entry = settings.entry(name)
     folder = settings.folder_of(entry) if entry else None
@@ -73,7 +77,7 @@ def _entry(name: str, settings: Settings) -> SceneEntry | None:
 
 def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
     if entry is None:
-        if os.path.exists(name):  # noqa: PTH110
+        if is_there(name):
             return Path(name)
         from ..common import catalogue  # no source: names to offer
 

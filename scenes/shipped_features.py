@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..common import bounded
 from ..common.errors import UserError
 from ..common.files import sha256_file, whole, write_json, write_text
 
@@ -24,6 +25,7 @@ def files(root: Path) -> tuple[Path, ...]:
 def write(root: Path, encoder: str, made_by: dict[str, Any], pictures: Sequence[str], rows: np.ndarray) -> Path:
     """Writes (N, D) rows of the N pictures, named by their SHA-256, as float16. Returns the .npy file."""
     folder = root / FOLDER
+    check_place(root)
     folder.mkdir(exist_ok=True)
     file = folder / f"{encoder}.npy"
     with whole(file) as temporary, open(temporary, "wb") as opened:
@@ -31,6 +33,12 @@ def write(root: Path, encoder: str, made_by: dict[str, Any], pictures: Sequence[
     write_json(file.with_suffix(".json"), {"schema": 1, "encoder": encoder, **made_by, "pictures": list(pictures)})
     write_text(file.with_suffix(".sha256"), _sums(file))  # last: what a stopped run leaves is not taken
     return file
+
+
+def check_place(root: Path) -> None:
+    """Raises UserError where what is written into the capture would land elsewhere."""
+    if (root / FOLDER).is_symlink():
+        raise UserError(f"'{root / FOLDER}' is a link, and may lead anywhere; remove it")
 
 
 def read(root: Path, encoder: str, made_by: Callable[[], dict[str, Any]]) -> dict[str, np.ndarray]:
@@ -46,9 +54,10 @@ def read(root: Path, encoder: str, made_by: Callable[[], dict[str, Any]]) -> dic
         return {}
     mend = "delete that folder, or bring it anew"
     try:
-        if file.with_suffix(".sha256").read_text(encoding="utf-8") != _sums(file):
+        said = bounded.data(file.with_suffix(".sha256"), "sums", 1 << 16)
+        if said.decode("utf-8") != _sums(file):
             raise UserError(f"features '{file}' or the .json beside it are not what the .sha256 says; {mend}")
-        rows: Any = np.load(file, allow_pickle=False)
+        rows: Any = bounded.array(file)
     except (OSError, ValueError, EOFError, MemoryError) as error:
         raise UserError(f"features '{file}' cannot be read: {error}; {mend}") from None
     pictures = record["pictures"]
@@ -65,8 +74,8 @@ def _sums(file: Path) -> str:
 def _record(file: Path) -> dict[str, Any] | None:
     """What the file says if it is ours: a capture may have a folder of this name for its own ends."""
     try:
-        record = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        record = json.loads(bounded.json_text(file, "features"))
+    except (UserError, ValueError, RecursionError):
         return None
     pictures = record.get("pictures") if isinstance(record, dict) else None
     ours = isinstance(pictures, list) and all(isinstance(one, str) for one in pictures) and "encoder" in record

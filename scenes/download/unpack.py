@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import IO
 
+from ...common import limits
+from ...common.catalogue import size_in_words
 from ...common.errors import UserError
 from .http import CHUNK, kind_of
 from .room import check_room
@@ -70,6 +72,9 @@ def members(archive: zipfile.ZipFile, prefix: str, also: tuple[str, ...], name: 
             chosen[info.filename[len(found) :]] = info
         elif info.filename in extra:
             chosen[extra[info.filename]] = info
+    # Members that share their bytes are packed once.
+    packed = sum({info.header_offset: info.compress_size for info in chosen.values()}.values())
+    check_expansion(sum(info.file_size for info in chosen.values()), packed, name)
     for info in chosen.values():
         if stat.S_ISLNK(info.external_attr >> 16):
             raise UserError(f"archive '{name}' has a link, '{info.filename}'; nothing is unpacked")
@@ -78,6 +83,15 @@ def members(archive: zipfile.ZipFile, prefix: str, also: tuple[str, ...], name: 
                 f"archive '{name}' wants a password for '{info.filename}'; it is not what the catalogue means"
             )
     return chosen
+
+
+def check_expansion(unpacked: int, packed: int, name: str) -> None:
+    """Raises UserError for an archive that becomes so much larger that it is no capture but meant to fill the disk."""
+    if unpacked > limits.EXPANSION * packed + limits.EXPANSION_FREE:
+        raise UserError(
+            f"archive '{name}' of {size_in_words(packed) or 'no bytes'} would become {size_in_words(unpacked)}, which "
+            "pictures do not; nothing more is unpacked"
+        )
 
 
 def spans(archive: zipfile.ZipFile, chosen: list[zipfile.ZipInfo]) -> list[tuple[int, int]]:
@@ -138,7 +152,7 @@ def extract_tar(path: Path, prefix: str, also: tuple[str, ...], folder: Path, na
     """
     names: list[str] = []
     extra = {wanted: PurePosixPath(wanted).name for wanted in also}
-    count = 0
+    count = total = 0
     with damaged(name), gzip.open(path) as stream:
         with tarfile.open(fileobj=stream, mode="r|", bufsize=CHUNK) as archive:
             for member in archive:
@@ -156,6 +170,8 @@ def extract_tar(path: Path, prefix: str, also: tuple[str, ...], folder: Path, na
                 source = archive.extractfile(member) if member.isreg() else None
                 if source is None:
                     raise UserError(f"archive '{name}' has a link or a device, '{member.name}'; nothing is unpacked")
+                total += member.size
+                check_expansion(total, path.stat().st_size, name)
                 check_room(folder, member.size)
                 target = folder / safe(relative, name)
                 target.parent.mkdir(parents=True, exist_ok=True)

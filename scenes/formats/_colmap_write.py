@@ -40,6 +40,11 @@ def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> list[str]
     """
     train, test = scene.train.subset(indices), scene.test
     names = _stored_names(scene, train, test)
+    for name in (*names["train"], *names["test"]):
+        if not name.isprintable() and any("\ud800" <= letter <= "\udfff" for letter in name):
+            raise UserError(
+                f"image '{name}' has a name that is not UTF-8 text, which COLMAP's files cannot hold; rename it"
+            )
     smaller = _smaller_folders(scene, [*names["train"], *names["test"]])
     _write_model(out, "sparse/0", scene, names, ("train",), train.cameras)
     _place(scene, names["train"], train.paths, smaller, out, copy)

@@ -5,12 +5,13 @@ import errno
 import os
 import signal
 import sys
+import warnings
 
 import click
 
 from ... import __version__
-from ...common import extras, plugins
-from ...common.errors import PassingError, UserError
+from ...common import extras, plugins, terminal
+from ...common.errors import PassingError, UserError, printable
 from .. import _follow
 from .._again import PASSING
 
@@ -54,6 +55,14 @@ def run(arguments: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, _stop)  # so that temporary files are removed on the way out
     if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) == signal.SIG_DFL:  # and not under nohup
         signal.signal(signal.SIGHUP, _stop)
+    if not sys.warnoptions:  # of libraries, about what a file holds: what matters of it is said in a sentence
+        for kind in (RuntimeWarning, UserWarning):
+            warnings.simplefilter("ignore", kind)
+    with terminal.guarded():
+        return _run(arguments)
+
+
+def _run(arguments: list[str] | None) -> int:
     try:
         _follow.follow()
         status = group.main(arguments, prog_name="viewbench", standalone_mode=False)
@@ -75,6 +84,9 @@ def run(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except UnicodeEncodeError as error:
+        name = str(error.object)[max(0, error.start - 40) : error.end + 40]
+        return _fail(f"a name is no text that can be written: '{printable(name)}'; rename the file")
     except OSError as error:
         if error.errno is None:
             raise
@@ -85,7 +97,7 @@ def run(arguments: list[str] | None = None) -> int:
 
 
 def _fail(message: str, status: int = 2) -> int:
-    print(f"viewbench: {message}", file=sys.stderr)
+    print(f"viewbench: {printable(message)}", file=sys.stderr)
     return status
 
 

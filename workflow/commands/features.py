@@ -17,7 +17,7 @@ def command(scene: _options.Capture, encoder: str | None, beside: bool, out: Pat
     """Embed the training views of SCENE; what is in the cache already is not embedded again."""
     from ...common import settings as settings_file
     from ...common.errors import UserError
-    from ...scenes import features
+    from ...scenes import features, shipped_features
 
     settings = settings_file.load()
     opened = scene.open(settings)
@@ -26,11 +26,11 @@ def command(scene: _options.Capture, encoder: str | None, beside: bool, out: Pat
     cache, batch, device = Path(settings.features.cache), settings.features.batch, settings.compute.device
     if beside and (":" in name or not opened.root.is_dir() or opened.details.get("extracted")):
         raise UserError("--beside is for folders of images, and for encoders by NAME (not NAME:MODEL)")
+    if beside:
+        shipped_features.check_place(opened.root)
     root = None if beside else opened.root
     rows = features.features(opened.train, name, cache, batch, _options.progress("features"), device, root)
     if beside:
-        from ...scenes import shipped_features
-
         pictures = [features.content_hash(path) for path in opened.train.paths]
         click.echo(shipped_features.write(opened.root, name, features.of_encoder(name), pictures, rows))
     if out is not None:
