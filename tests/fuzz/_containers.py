@@ -3,6 +3,7 @@
 import io
 import re
 import struct
+import warnings
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -183,7 +184,11 @@ def zipped(data: bytes, rng: Random, pool: Sequence[bytes]) -> bytes:
         return bytes(made)
     out = io.BytesIO()
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as source, zipfile.ZipFile(out, "w") as made:
+        with (
+            warnings.catch_warnings(action="ignore"),
+            zipfile.ZipFile(io.BytesIO(data)) as source,
+            zipfile.ZipFile(out, "w") as made,
+        ):
             infos = source.infolist()
             odd = rng.randrange(max(1, len(infos)))
             for k, info in enumerate(infos):
