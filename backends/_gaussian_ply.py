@@ -7,6 +7,7 @@ import numpy as np
 
 from ..common.errors import UserError
 from ..common.files import whole
+from ..scenes._ply_table import vertices
 
 
 @dataclass(frozen=True)
@@ -66,15 +67,15 @@ def save(path: Path, gaussians: Gaussians) -> None:
 
 def load(path: Path) -> Gaussians:
     """Reads what `save` or any 3DGS trainer wrote. Raises UserError for a file that is missing or has other fields."""
-    from plyfile import PlyData, PlyParseError
-
     try:
-        vertex = PlyData.read(str(path))["vertex"].data
+        vertex = vertices(path)
         rest = sum(name.startswith("f_rest_") for name in vertex.dtype.names) // 3
         columns = np.stack([vertex[name] for name in fields(rest) if not name.startswith("n")], axis=1)
     except OSError as error:
         raise UserError(f"model '{path}' cannot be read: {error.strerror}; train it again") from None
-    except (PlyParseError, KeyError, ValueError) as error:
+    except MemoryError:
+        raise UserError(f"model '{path}' cannot be read: there is not enough memory for it") from None
+    except ValueError as error:
         raise UserError(f"model '{path}' is not a PLY file of 3D Gaussians: {error}") from None
     columns = columns.astype(np.float32)
     means, sh0, shn, opacities, scales, quats = np.split(columns, np.cumsum([3, 3, 3 * rest, 1, 3]), axis=1)

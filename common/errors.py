@@ -1,5 +1,15 @@
 """The one error that a user can cause, and the way it reaches them."""
 
+LONGEST = 4000  # letters of a message: names and values of a file may be of any length
+
+
+def printable(text: str) -> str:
+    """The text with what a terminal would obey and not show (escape sequences, line breaks, marks that turn the
+    direction of writing) and what is no text (lone surrogates) as Python writes them: `\\x1b`."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
 
 class UserError(Exception):
     """What was got, what was expected and what to do, in one sentence that names the file and the frame.
@@ -8,7 +18,8 @@ class UserError(Exception):
     """
 
     def __init__(self, message: str):
-        super().__init__(" ".join(str(message).split()))
+        text = printable(" ".join(str(message).split()))
+        super().__init__(text if len(text) <= LONGEST else f"{text[: LONGEST - 1000]} … {text[-1000:]}")
 
 
 def nearest(word: str, known) -> str:

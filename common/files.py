@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from . import bounded
 from .errors import UserError
 
 SEAL = "content_sha256"  # of a JSON record: the hash of all the rest of it
@@ -73,13 +74,8 @@ def write_json(path: str | os.PathLike, value: Any) -> None:
 
 
 def read_json(path: str | os.PathLike, what: str = "file") -> Any:
-    """Reads JSON; raises UserError that names the file when it is missing or broken."""
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"{what} '{path}' cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise UserError(f"{what} '{path}' is not UTF-8 text; it should be a JSON file") from None
+    """Reads JSON; raises UserError that names the file when it is missing, broken or beyond `limits`."""
+    text = bounded.json_text(path, what)
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -139,6 +135,7 @@ def user_cache(name: str) -> Path:
 
 
 def sha256_file(path: str | os.PathLike) -> str:
-    """Hex SHA-256 of the file's bytes."""
+    """Hex SHA-256 of the file's bytes. Raises OSError, too, for a pipe or a device."""
+    bounded.checked(path)
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

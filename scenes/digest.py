@@ -7,6 +7,7 @@ import os
 import time
 from pathlib import Path
 
+from ..common import bounded, limits
 from ..common.errors import UserError
 from ..common.files import sha256_file, user_cache, write_json
 from .types import Scene
@@ -86,6 +87,7 @@ def _state(path: Path) -> list[int]:
     Empty where there is no such file: whoever wants a picture's pixels says that it is gone, a hash can do without.
     """
     try:
+        bounded.checked(path, limits.VIDEO_BYTES)
         found = path.stat()
     except (FileNotFoundError, NotADirectoryError):
         return []

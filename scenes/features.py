@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common import plugins
+from ..common import bounded, limits, plugins
 from ..common.errors import UserError
 from ..common.files import sha256_file, whole
 from ..common.sources import code_sha256
@@ -101,9 +101,11 @@ def load_user_features(path: Path, n: int) -> np.ndarray:
     Raises UserError for a file that is none, has another number of rows than `n`, or NaN in some row.
     """
     try:
-        array: Any = np.load(path, allow_pickle=False)
+        array: Any = bounded.array(path)
     except OSError as error:
         raise UserError(f"features '{path}' cannot be read: {error.strerror or error}") from None
+    except MemoryError:
+        raise UserError(f"features '{path}' cannot be read: there is not enough memory for them") from None
     except (ValueError, EOFError):
         raise UserError(f"features '{path}' are not a .npy file of numbers; write them with numpy.save") from None
     if getattr(array, "ndim", 0) != 2 or array.dtype.kind not in "fiu" or len(array) != n:
@@ -118,6 +120,7 @@ def load_user_features(path: Path, n: int) -> np.ndarray:
 def content_hash(path: Path) -> str:
     """Hex SHA-256 of an image file. Raises UserError when it cannot be read."""
     try:
+        bounded.checked(path, limits.IMAGE_BYTES)
         return sha256_file(path)
     except OSError as error:
         raise UserError(f"image '{path}' cannot be read: {error.strerror}") from None

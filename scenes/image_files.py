@@ -1,14 +1,19 @@
 """Image files of a capture: whether they are there, whether they can be read, and where their names lead."""
 
 import contextlib
+import functools
+import struct
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from ..common import bounded, limits
 from ..common import extras  # no source: it says what to install
 from ..common.errors import UserError
 
 HEIC = {".heic", ".heif", ".hif"}  # as iPhones and some cameras write them; PIL reads them with pillow-heif
+# Those that are opened, whatever the file is called. PIL knows forty more; for one of them, EPS, it runs Ghostscript.
+FORMATS = ("JPEG", "PNG", "BMP", "GIF", "PPM", "MPO", "TIFF", "WEBP", "JPEG2000")
 
 
 def is_file(path: Path) -> bool:
@@ -19,28 +24,67 @@ def is_file(path: Path) -> bool:
         return False
 
 
-@contextlib.contextmanager
-def open_image(path: Path) -> Iterator[Any]:
-    """The PIL image, not decoded yet. Raises UserError, in the body too, when it is missing, cut short or no image."""
+@functools.cache
+def _bounded_pillow() -> None:
+    """Has PIL refuse more than limits.PIXELS: it does at twice its limit, and only warns at the limit itself."""
+    import warnings
+
     from PIL import Image
+
+    Image.MAX_IMAGE_PIXELS = limits.PIXELS // 2
+    warnings.filterwarnings("ignore", category=Image.DecompressionBombWarning)
+
+
+@contextlib.contextmanager
+def open_image(path: Path, head: bool = False) -> Iterator[Any]:
+    """The PIL image, not decoded yet; `head` says that it will not be.
+
+    Raises UserError, in the body too, when it is missing, cut short, no image, or beyond `limits`.
+    """
+    from PIL import Image
+
+    _bounded_pillow()
+    formats = FORMATS
 
     if path.suffix.lower() in HEIC:
         extras.need("pillow_heif")
         import pillow_heif  # pyright: ignore[reportMissingImports]: an extra
 
         pillow_heif.register_heif_opener()
+        formats = (*FORMATS, "HEIF")
+    elif path.suffix.lower() == ".avif":
+        formats = (*FORMATS, "AVIF")
     try:
-        with Image.open(path) as image:
+        bounded.checked(path, limits.IMAGE_BYTES)
+        with Image.open(path, formats=formats) as image:
+            if not head and image.format in ("JPEG", "MPO") and "progressive" in image.info:
+                _check_scans(path)
             yield image
     except FileNotFoundError:
         raise UserError(f"image '{path}' is missing") from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise UserError(f"image '{path}' cannot be read: {error}") from None
+    except Image.DecompressionBombError:
+        most = f"{limits.PIXELS // 1_000_000} million"
+        raise UserError(f"image '{path}' cannot be read: it has more than {most} pixels; resize it") from None
+    except Image.UnidentifiedImageError:
+        raise UserError(f"image '{path}' cannot be read: it is none of {', '.join(formats)}") from None
+    except MemoryError:
+        raise UserError(f"image '{path}' cannot be read: there is not enough memory for it") from None
+    except (OSError, SyntaxError, ValueError, KeyError, EOFError, struct.error) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise UserError(f"image '{path}' cannot be read: {reason}") from None
+
+
+def _check_scans(path: Path) -> None:
+    """Raises OSError for a JPEG that is drawn over more often than limits.SCANS."""
+    content = bounded.data(path, "image", limits.IMAGE_BYTES)
+    scans = content.count(b"\xff\xda")  # in a picture's data 0xFF is followed by zero
+    if scans > limits.SCANS:
+        raise OSError(f"it is drawn in {scans:,} scans, at most {limits.SCANS} are read")
 
 
 def image_size(path: Path) -> tuple[int, int]:
     """(width, height) in pixels, from the file's head. Raises UserError for a missing file and one that is no image."""
-    with open_image(path) as image:
+    with open_image(path, head=True) as image:
         return image.size
 
 

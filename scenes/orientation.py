@@ -26,14 +26,14 @@ JPEG = {".jpg", ".jpeg"}
 
 def orientation(path: Path) -> int:
     """The EXIF orientation, 1 to 8, of an image; 1 where it has none. Raises UserError for what is no image."""
-    with open_image(path) as image:
+    with open_image(path, head=True) as image:
         found = image.getexif().get(ORIENTATION, 1)
     return found if found in range(1, 9) else 1
 
 
 def upright_size(path: Path) -> tuple[int, int]:
     """(width, height) in pixels as the photo is seen. Raises UserError for a missing file and one that is no image."""
-    with open_image(path) as image:
+    with open_image(path, head=True) as image:
         found = image.getexif().get(ORIENTATION, 1)
         # PIL itself turns TIFF as it reads it, and gives the size that it will have.
         return image.size[::-1] if found in (5, 6, 7, 8) and image.format != "TIFF" else image.size

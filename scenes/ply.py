@@ -6,23 +6,28 @@ import numpy as np
 
 from ..common.errors import UserError
 from ..common.files import whole
+from ._ply_table import vertices
 from .types import Points
 
 
 def read_points(path: Path) -> Points:
-    """Positions and colours (grey where there are none). Raises UserError for a file that is no point cloud."""
-    from plyfile import PlyData, PlyParseError
+    """Positions and colours (grey where there are none). Raises UserError for a file that is no point cloud.
 
+    Coordinates that are NaN or infinite are found by `validate.check_scene`.
+    """
     try:
-        vertex = PlyData.read(path)["vertex"]
+        vertex = vertices(path)
         xyz = np.stack([vertex[axis] for axis in "xyz"], axis=1).astype(np.float64)
-        named = {prop.name for prop in vertex.properties}
+        named = set(vertex.dtype.names or ())
         channels = ("red", "green", "blue")
         rgb = np.full((len(xyz), 3), 128, dtype=np.uint8)
         if set(channels) <= named:
             rgb = np.stack([vertex[channel] for channel in channels], axis=1).astype(np.uint8)
-    except (PlyParseError, KeyError, ValueError, OSError, EOFError) as error:
-        raise UserError(f"points '{path}' cannot be read as PLY: {error}") from None
+    except MemoryError:
+        raise UserError(f"points '{path}' cannot be read: there is not enough memory for them") from None
+    except (ValueError, OSError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise UserError(f"points '{path}' cannot be read as PLY: {reason}") from None
     return Points(xyz, rgb)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..common import bounded
 from ..common.errors import UserError
 from ..common.files import sha256_file, whole, write_json, write_text
 
@@ -46,9 +47,10 @@ def read(root: Path, encoder: str, made_by: Callable[[], dict[str, Any]]) -> dic
         return {}
     mend = "delete that folder, or bring it anew"
     try:
-        if file.with_suffix(".sha256").read_text(encoding="utf-8") != _sums(file):
+        said = bounded.data(file.with_suffix(".sha256"), "sums", 1 << 16)
+        if said.decode("utf-8") != _sums(file):
             raise UserError(f"features '{file}' or the .json beside it are not what the .sha256 says; {mend}")
-        rows: Any = np.load(file, allow_pickle=False)
+        rows: Any = bounded.array(file)
     except (OSError, ValueError, EOFError, MemoryError) as error:
         raise UserError(f"features '{file}' cannot be read: {error}; {mend}") from None
     pictures = record["pictures"]
@@ -65,8 +67,8 @@ def _sums(file: Path) -> str:
 def _record(file: Path) -> dict[str, Any] | None:
     """What the file says if it is ours: a capture may have a folder of this name for its own ends."""
     try:
-        record = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        record = json.loads(bounded.json_text(file, "features"))
+    except (UserError, ValueError, RecursionError):
         return None
     pictures = record.get("pictures") if isinstance(record, dict) else None
     ours = isinstance(pictures, list) and all(isinstance(one, str) for one in pictures) and "encoder" in record

@@ -15,7 +15,8 @@ def check_scene(scene: Scene) -> None:
         raise UserError(f"scene '{scene.name}' has no training views in '{scene.root}'")
     names = [*scene.train.names, *scene.test.names]
     if len(set(names)) != len(names):
-        twice = next(name for name in names if names.count(name) > 1)
+        known: set[str] = set()
+        twice = next(name for name in names if name in known or known.add(name))
         raise UserError(f"scene '{scene.name}': frame '{twice}' is listed twice; frame names must be unique")
     for split in (scene.train, scene.test):
         _check_split(scene, split)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...common import limits
 from ...common.errors import UserError
 from ..image_files import image_size
 from ..types import OPENCV, Cameras, Split
@@ -39,7 +40,9 @@ def posed(images: Sequence[Path], files: Sequence[Path], root: Path) -> tuple[np
 
 
 def natural(name: str) -> list[tuple[int, int, str]]:
-    """Sorting key that puts frame2 before frame10."""
+    """Sorting key that puts frame2 before frame10. Raises UserError for a name longer than any file system takes."""
+    if len(name) > limits.NAME_LETTERS:
+        raise UserError(f"frame '{name[:40]}…' has a name of {len(name):,} letters, at most {limits.NAME_LETTERS:,} are read")
     return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", name)]
 
 

@@ -5,24 +5,31 @@ from pathlib import Path
 
 import numpy as np
 
+from ...common import bounded, limits
 from ...common.errors import UserError
 
+BREAKS = ("\n", "\r", "\v", "\f", "\x1c", "\x1d", "\x1e", "\x85", "\u2028", "\u2029")  # as `splitlines` has them
 NOT_A_NUMBER = re.compile(r"[+-]?1\.#\w+")  # how older C libraries on Windows print NaN and infinity
 
 
 def lines(path: Path, what: str) -> list[tuple[int, str]]:
     """(number, text) of the lines that are neither empty nor a comment, which begins with `#`.
 
-    A byte order mark and Windows line ends are no part of them. Raises UserError for a file that is missing or no text.
+    A byte order mark and Windows line ends are no part of them. Raises UserError for a file that is missing, no text
+    or beyond `limits`.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise UserError(f"{what} '{path}' cannot be read: {error.strerror}") from None
+        text = bounded.data(path, what, limits.TEXT_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise UserError(f"{what} '{path}' is no text file (UTF-8)") from None
+    if sum(map(text.count, BREAKS)) > limits.LINES:
+        raise UserError(f"{what} '{path}' has more than {limits.LINES:,} lines; thin it out")
     found = ((number, line.strip()) for number, line in enumerate(text.splitlines(), 1))
-    return [(number, line) for number, line in found if line and not line.startswith("#")]
+    kept = [(number, line) for number, line in found if line and not line.startswith("#")]
+    long = next((number for number, line in kept if len(line) > limits.LINE_LETTERS), None)
+    if long is not None:
+        raise UserError(f"{what} '{path}', line {long} has more than {limits.LINE_LETTERS:,} letters; it is no such file")
+    return kept
 
 
 def table(path: Path, what: str) -> tuple[np.ndarray, list[int]]:
@@ -34,6 +41,7 @@ def table(path: Path, what: str) -> tuple[np.ndarray, list[int]]:
     """
     rows: list[list[float]] = []
     kept: list[int] = []
+    count = 0
     for number, line in lines(path, what):
         words = re.split(r"\s#", line)[0].replace(",", " ").split()
         row = [_number(word) for word in words]
@@ -41,12 +49,16 @@ def table(path: Path, what: str) -> tuple[np.ndarray, list[int]]:
         if not found and not rows:
             continue
         if len(found) < len(row):
-            raise UserError(f"{what} '{path}', line {number}: '{words[row.index(None)][:40]}' is no number")
+            shown = bounded.quoted(path, words[row.index(None)], 40)
+            raise UserError(f"{what} '{path}', line {number}: {shown} is no number")
         if rows and len(found) != len(rows[0]):
             raise UserError(
                 f"{what} '{path}', line {number} has {len(found)} numbers, the line before it {len(rows[0])}; "
                 "each row should have equally many"
             )
+        count += len(found)
+        if count > limits.NUMBERS:
+            raise UserError(f"{what} '{path}' has more than {limits.NUMBERS:,} numbers; thin it out")
         rows.append(found)
         kept.append(number)
     if not rows:

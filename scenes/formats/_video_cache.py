@@ -33,6 +33,13 @@ def hold(name: str) -> Path:
     return folder
 
 
+def drop(folder: Path) -> None:
+    """Removes a folder that this process holds and that has no picture in it: of a file that turned out to be none."""
+    if folder in _held and not any(folder.glob("*.jpg")):
+        _held.pop(folder).close()
+        _remove(folder)
+
+
 def trim(gigabytes: int) -> None:
     """Removes folders that were not used for longest until all of them take no more than the limit, and says so.
 

@@ -16,9 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from ...common import bounded, limits
 from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError
 
+# The containers of the endings in `video.SUFFIXES`. By its content FFmpeg would open anything under these names, such as
+# lists of other files and addresses (HLS, concat).
+OPENING = {"format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts", "protocol_whitelist": "file"}
 KEY, SPARE, HIDDEN = 1, 2, 4  # bits of `flags`: decoding can start here; no other frame needs it; not shown
 
 
@@ -66,11 +70,15 @@ def opened(root: Path) -> Iterator[tuple[Any, Any]]:
     from av.error import FFmpegError
 
     try:
-        with av.open(str(root), metadata_errors="replace") as container:
+        bounded.checked(root, limits.VIDEO_BYTES)
+        # An absolute path: of "concat:a.mp4" FFmpeg would take the beginning for a protocol.
+        with av.open(str(root.absolute()), metadata_errors="replace", options=OPENING) as container:
             stream = _film(container, root)
             stream.thread_type = "AUTO"
+            # Also of frames that are larger than the stream says: memory is taken for them before they are seen.
+            stream.codec_context.options = {"max_pixels": str(limits.VIDEO_PIXELS)}
             yield container, stream
-    except (FFmpegError, ValueError, OSError) as error:
+    except (FFmpegError, ValueError, OSError, OverflowError) as error:
         reason = _no_index(root) or f"cannot be decoded: {error}"
         raise UserError(f"video '{root}' {reason}") from None
 
@@ -83,7 +91,14 @@ def _film(container: Any, root: Path) -> Any:
     films = [s for s in films if s.codec_context is not None and s.width]
     if not films:
         raise UserError(f"'{root}' has no video in it")
-    return max(films, key=lambda s: (bool(s.disposition & Disposition.default), s.width * s.height, -s.index))
+    film = max(films, key=lambda s: (bool(s.disposition & Disposition.default), s.width * s.height, -s.index))
+    aspect = float(film.sample_aspect_ratio or 1) or 1.0
+    if not 1 / limits.PIXEL_ASPECT <= aspect <= limits.PIXEL_ASPECT:
+        raise UserError(f"video '{root}' says that its pixels are {aspect:.3g} times as wide as high; correct its head")
+    if film.width * film.height * max(1.0, aspect) > limits.VIDEO_PIXELS:
+        most = f"{limits.VIDEO_PIXELS / 1e6:.0f} million pixels"
+        raise UserError(f"video '{root}' says that it is {film.width} x {film.height}, more than {most}; scale it down")
+    return film
 
 
 def read_packets(root: Path) -> Packets:
@@ -100,6 +115,8 @@ def read_packets(root: Path) -> Packets:
                 if not packet.size:
                     continue
                 hidden = packet.is_discard or packet.is_corrupt
+                if len(rows) > limits.SAMPLES:
+                    raise UserError(f"video '{root}' has more than {limits.SAMPLES:,} frames; cut it")
                 rows.append((packet.pts, KEY * packet.is_keyframe | SPARE * packet.is_disposable | HIDDEN * hidden))
                 whole &= not packet.is_corrupt
         except FFmpegError:  # what came before can be used

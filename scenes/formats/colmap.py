@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...common import bounded, limits
 from ...common.errors import UserError
 from ..companions import first_of
 from ..image_files import image_size, is_file, leaves
@@ -62,8 +63,13 @@ def _image_count(model: Path) -> int:
         if (model / "images.bin").is_file():
             with (model / "images.bin").open("rb") as file:
                 return int.from_bytes(file.read(8), "little")
-        with (model / "images.txt").open(encoding="utf-8", errors="replace") as file:
-            return sum(not line.startswith("#") for line in file) // 2  # two lines an image
+        bounded.checked(model / "images.txt", limits.COLMAP_BYTES)
+        begins, count = True, 0
+        with (model / "images.txt").open("rb") as file:
+            while line := file.readline(limits.LINE_LETTERS):  # of points a line may have any length
+                count += begins and not line.startswith(b"#")
+                begins = line.endswith(b"\n")
+        return count // 2  # two lines an image
     except OSError:
         return 0
 
@@ -232,7 +238,8 @@ def _resized(reconstruction: Any, images: Sequence[Any], frames: Split, folder: 
 def _listed(file: Path) -> list[str]:
     """Names in test.txt; one with a line break is written as JSON."""
     try:
-        lines = [line for line in file.read_text(encoding="utf-8").split("\n") if line.strip()]
+        text = bounded.data(file, "list", limits.TEXT_BYTES).decode("utf-8")
+        lines = [line for line in text.split("\n", limits.LINES)[: limits.LINES] if line.strip()]
     except UnicodeDecodeError:
         raise UserError(f"'{file}' is no text file of image names") from None
     return [_unquoted(line) for line in lines]
@@ -268,6 +275,8 @@ def _intrinsics(camera: Any) -> list[float]:
     """fx, fy, cx, cy, width, height, k1, k2, p1, p2, k3; no distortion for a lens that is not OpenCV's."""
     if not camera.focal_length_idxs():  # asked for one, pycolmap would crash
         raise UserError(f"COLMAP camera {camera.camera_id} is {camera.model.name}, which has no focal length")
+    if max(camera.width, camera.height) > limits.SIDE:
+        raise UserError(f"COLMAP camera {camera.camera_id} is of {camera.width} x {camera.height} pixels")
     focal = [camera.focal_length_x, camera.focal_length_y, camera.principal_point_x, camera.principal_point_y]
     count = 0 if _lens(camera) else LENSES[camera.model.name]
     first = len(camera.params) - count if camera.model.name != "FULL_OPENCV" else 4

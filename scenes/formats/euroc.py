@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...common.bounded import quoted
 from ...common.errors import UserError
 from ..types import Cameras, Scene, Split
 from ._frames import split
@@ -103,9 +104,11 @@ def _frames(folder: Path) -> tuple[np.ndarray, list[Path]]:
         if not stamp.isdecimal() or not name:
             if not rows and not re.match(r"\d", stamp):
                 continue  # a heading without its '#'
-            raise UserError(f"'{file}', line {number}: there should be nanoseconds and a file name, not '{line[:60]}'")
+            raise UserError(
+                f"'{file}', line {number}: there should be nanoseconds and a file name, not {quoted(file, line)}"
+            )
         if Path(name).name != name or name in ("..", ".") or "\0" in name:
-            raise UserError(f"'{file}', line {number}: '{name[:60]}' is no name of a file in data/")
+            raise UserError(f"'{file}', line {number}: {quoted(file, name)} is no name of a file in data/")
         rows.append((_nanoseconds(stamp, file, number), folder / "data" / name))
     if not rows:
         raise UserError(f"'{file}' lists no images")
@@ -115,7 +118,7 @@ def _frames(folder: Path) -> tuple[np.ndarray, list[Path]]:
 
 def _nanoseconds(word: str, file: Path, number: int) -> int:
     if len(word) > 18 + 1 or int(word) >= 1 << 63:
-        raise UserError(f"'{file}', line {number}: '{word[:40]}' is no time in nanoseconds")
+        raise UserError(f"'{file}', line {number}: {quoted(file, word, 40)} is no time in nanoseconds")
     return int(word)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...common.bounded import quoted
 from ...common.errors import UserError
 from ..types import Scene, Split
 from ._frames import by_number, posed, split
@@ -107,9 +108,9 @@ def _named(root: Path, file: Path) -> list[Path]:
     folders = []
     for _, line in lines(file, "split"):
         number = re.search(r"\d+", line)
-        folder = root / f"seq-{int(number[0]):02d}" if number else root / "?"
+        folder = root / f"seq-{int(number[0]):02d}" if number and len(number[0]) < 10 else root / "?"
         if not folder.is_dir():
-            raise UserError(f"'{file}' names '{line}', but '{root}' has no folder '{folder.name}'")
+            raise UserError(f"'{file}' names {quoted(file, line)}, but '{root}' has no folder '{folder.name}'")
         folders.append(folder)
     return folders
 

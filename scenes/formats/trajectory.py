@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...common.bounded import quoted
 from ...common.errors import UserError
 from ..image_files import image_size, is_file
 from ..types import UNCALIBRATED, Scene
@@ -186,7 +187,7 @@ def _stamps(paths: tuple[Path, ...], times: Path | None) -> np.ndarray | None:
         except ValueError:
             if not stamps:
                 continue  # a heading
-            raise UserError(f"times '{times}', line {number}: '{words[0][:40]}' is no number") from None
+            raise UserError(f"times '{times}', line {number}: {quoted(times, words[0], 40)} is no number") from None
         names.append(words[1].strip() if len(words) == 2 else "")
     if not stamps or not np.isfinite(stamps).all():
         raise UserError(f"times '{times}' should have a time on each line")

@@ -1,11 +1,14 @@
 """transforms.json of Blender and nerfstudio: one file, or transforms_train/test/val.json (IndoorTraj, Replica)."""
 
 import math
+from collections import ChainMap
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...common import limits
 from ...common.errors import UserError
 from ...common.files import read_json
 from ..image_files import image_size, is_file, leaves
@@ -104,7 +107,7 @@ def _split(root: Path, file: Path, table: Any, allow_outside: bool) -> Split:
             raise UserError(f"'{file}': frame {number} has no file_path")
         name = frame["file_path"]
         path = _image(root, name, file, allow_outside)
-        camera = {**table, **frame}
+        camera = ChainMap(frame, table)  # a copy of a large table for each of many frames would take hours
         rows.append(_intrinsics(camera, name, path, file, sizes))
         lens = lens or _lens(camera)
         poses.append(_pose(frame, name, file))
@@ -144,7 +147,7 @@ def _times(values: list[Any]) -> np.ndarray | None:
     return times if np.isfinite(times).all() else None
 
 
-def _lens(camera: dict) -> str:
+def _lens(camera: Mapping[str, Any]) -> str:
     """The camera model where it is another one than OpenCV's with k1, k2, p1, p2, k3."""
     model = str(camera.get("camera_model", ""))
     if model not in LENSES:
@@ -176,7 +179,7 @@ def _pose(frame: dict, name: str, file: Path) -> np.ndarray:
     return pose
 
 
-def _intrinsics(table: dict, name: str, path: Path, file: Path, sizes: dict[Path, tuple[int, int]]) -> list[float]:
+def _intrinsics(table: Mapping[str, Any], name: str, path: Path, file: Path, sizes: dict[Path, tuple[int, int]]) -> list[float]:
     try:
         width, height = (float(table[key]) if key in table else 0.0 for key in ("w", "h"))
         if not width or not height:
@@ -197,7 +200,7 @@ def _intrinsics(table: dict, name: str, path: Path, file: Path, sizes: dict[Path
         lens = [float(table.get(key, 0.0)) for key in LENS]
     except (TypeError, ValueError, ZeroDivisionError, OverflowError):
         raise UserError(f"'{file}': the intrinsics of frame '{name}' are no numbers") from None
-    if not (1 <= width <= 1e6 and 1 <= height <= 1e6):
+    if not (1 <= width <= limits.SIDE and 1 <= height <= limits.SIDE):
         raise UserError(f"'{file}': frame '{name}' is {width} x {height} pixels")
     return [fx, fy, cx, cy, width, height, *lens]
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...common.bounded import quoted
 from ...common.errors import UserError
 from ..types import Scene
 from ._frames import split
@@ -80,9 +81,11 @@ def _listed(root: Path, name: str) -> tuple[np.ndarray, list[Path]]:
         if not image or not np.isfinite(time):
             if not rows and not any(character.isdigit() for character in stamp):
                 continue  # a heading
-            raise UserError(f"'{file}', line {number}: there should be a time and a file name, not '{line[:60]}'")
+            raise UserError(
+                f"'{file}', line {number}: there should be a time and a file name, not {quoted(file, line)}"
+            )
         if Path(image).is_absolute() or ".." in Path(image).parts or "\0" in image:
-            raise UserError(f"'{file}', line {number}: '{image}' leaves the scene folder")
+            raise UserError(f"'{file}', line {number}: {quoted(file, image)} leaves the scene folder")
         rows[time] = image
     if not rows:
         raise UserError(f"'{file}' lists no frames")

@@ -15,9 +15,9 @@ from ...common.sources import code_sha256
 from ..digest import file_sha256
 from ..thinning import Thinning, frame_name, frame_number, kept
 from ..types import Scene, Split
-from ._video_cache import hold, trim
+from ._video_cache import drop, hold, trim
 from ._video_decode import frames
-from ._video_packets import Packets, read_packets
+from ._video_packets import Packets, opened, read_packets
 from ._video_picture import Look, hdr, look_of, picture, size
 from .images import nominal_cameras, unposed
 
@@ -57,9 +57,21 @@ def read(
     Raises UserError for a file that is no video, and when PyAV is not installed.
     """
     extras.need("av")
+    with opened(root):  # before all of it is read for its hash
+        pass
     # The code of decoding is in the name: pictures of another version are not taken for those of this one.
     code = code_sha256("scenes.formats._video_picture", "scenes.formats._video_decode")[:8]
     folder = hold(f"{file_sha256(root)[:32]}-{SMALL}-{code}")
+    try:
+        return _read(root, folder, thinning, cache_gb, progress, extract)
+    except UserError:
+        drop(folder)
+        raise
+
+
+def _read(
+    root: Path, folder: Path, thinning: Thinning, cache_gb: int, progress: Progress | None, extract: bool
+) -> Scene:
     packets, lost = _table(root, folder)
     times = packets.times
     numbers = np.flatnonzero(kept(len(times), times, thinning))
