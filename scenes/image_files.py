@@ -13,7 +13,7 @@ from ..common.errors import UserError
 
 HEIC = {".heic", ".heif", ".hif"}  # as iPhones and some cameras write them; PIL reads them with pillow-heif
 # Those that are opened, whatever the file is called. PIL knows forty more; for one of them, EPS, it runs Ghostscript.
-FORMATS = ("JPEG", "PNG", "BMP", "GIF", "PPM", "MPO", "TIFF", "WEBP", "JPEG2000")
+FORMATS = ("JPEG", "PNG", "BMP", "GIF", "PPM", "TIFF", "WEBP", "JPEG2000")  # MPO is opened as JPEG
 
 
 def is_file(path: Path) -> bool:
