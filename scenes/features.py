@@ -149,6 +149,8 @@ def picture(path: Path, size: int) -> np.ndarray:
 def cached(file: Path) -> np.ndarray | None:
     """The row in the cache, or None where there is none or it is damaged."""
     try:
-        return np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError):
+        row: Any = bounded.array(file)
+    except (OSError, ValueError):
         return None
+    whole_row = isinstance(row, np.ndarray) and row.ndim == 1 and row.dtype == np.float32 and np.isfinite(row).all()
+    return row if whole_row else None

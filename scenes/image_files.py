@@ -10,6 +10,7 @@ from typing import Any
 from ..common import bounded, limits
 from ..common import extras  # no source: it says what to install
 from ..common.errors import UserError
+from ._quiet import hush_pillow, silenced
 
 HEIC = {".heic", ".heif", ".hif"}  # as iPhones and some cameras write them; PIL reads them with pillow-heif
 # Those that are opened, whatever the file is called. PIL knows forty more; for one of them, EPS, it runs Ghostscript.
@@ -44,6 +45,7 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
     from PIL import Image
 
     _bounded_pillow()
+    hush_pillow()
     formats = FORMATS
 
     if path.suffix.lower() in HEIC:
@@ -59,7 +61,8 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
         with Image.open(path, formats=formats) as image:
             if not head and image.format in ("JPEG", "MPO") and "progressive" in image.info:
                 _check_scans(path)
-            yield image
+            with silenced(image.format == "TIFF"):
+                yield image
     except FileNotFoundError:
         raise UserError(f"image '{path}' is missing") from None
     except Image.DecompressionBombError:

@@ -36,6 +36,9 @@ def _check_split(scene: Scene, split: Split) -> None:
     bad |= np.abs(cameras.c2w[:, 3] - [0, 0, 0, 1]).max(axis=1, initial=0) > RIGID
     if bad.any():
         raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' is no rigid motion")
+    if cameras.distortion is not None and not np.isfinite(cameras.distortion).all():
+        bad = ~np.isfinite(cameras.distortion).all(axis=1)
+        raise UserError(f"scene '{scene.name}': the lens of frame '{_first(split, bad)}' has NaN or infinite numbers")
     sizes = np.stack([cameras.fx, cameras.fy, cameras.width, cameras.height])
     bad = ~((sizes > 0) & np.isfinite(sizes)).all(axis=0) | ~np.isfinite(cameras.cx + cameras.cy)
     if bad.any():

@@ -42,7 +42,9 @@ def posed(images: Sequence[Path], files: Sequence[Path], root: Path) -> tuple[np
 def natural(name: str) -> list[tuple[int, int, str]]:
     """Sorting key that puts frame2 before frame10. Raises UserError for a name longer than any file system takes."""
     if len(name) > limits.NAME_LETTERS:
-        raise UserError(f"frame '{name[:40]}…' has a name of {len(name):,} letters, at most {limits.NAME_LETTERS:,} are read")
+        raise UserError(
+            f"frame '{name[:40]}…' has a name of {len(name):,} letters, at most {limits.NAME_LETTERS:,} are read"
+        )
     return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", name)]
 
 

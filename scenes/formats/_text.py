@@ -28,7 +28,9 @@ def lines(path: Path, what: str) -> list[tuple[int, str]]:
     kept = [(number, line) for number, line in found if line and not line.startswith("#")]
     long = next((number for number, line in kept if len(line) > limits.LINE_LETTERS), None)
     if long is not None:
-        raise UserError(f"{what} '{path}', line {long} has more than {limits.LINE_LETTERS:,} letters; it is no such file")
+        raise UserError(
+            f"{what} '{path}', line {long} has more than {limits.LINE_LETTERS:,} letters; it is no such file"
+        )
     return kept
 
 

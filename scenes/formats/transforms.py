@@ -179,7 +179,9 @@ def _pose(frame: dict, name: str, file: Path) -> np.ndarray:
     return pose
 
 
-def _intrinsics(table: Mapping[str, Any], name: str, path: Path, file: Path, sizes: dict[Path, tuple[int, int]]) -> list[float]:
+def _intrinsics(
+    table: Mapping[str, Any], name: str, path: Path, file: Path, sizes: dict[Path, tuple[int, int]]
+) -> list[float]:
     try:
         width, height = (float(table[key]) if key in table else 0.0 for key in ("w", "h"))
         if not width or not height:

@@ -13,7 +13,20 @@ from tests.fuzz import _odd
 from tests.fuzz._mutate import Way, any_bytes, odd_number, text
 
 PNG = b"\x89PNG\r\n\x1a\n"
-ODD_CHUNKS = (b"tEXt", b"zTXt", b"iTXt", b"iCCP", b"eXIf", b"tRNS", b"PLTE", b"gAMA", b"acTL", b"fcTL", b"fdAT", b"sRGB")
+ODD_CHUNKS = (
+    b"tEXt",
+    b"zTXt",
+    b"iTXt",
+    b"iCCP",
+    b"eXIf",
+    b"tRNS",
+    b"PLTE",
+    b"gAMA",
+    b"acTL",
+    b"fcTL",
+    b"fdAT",
+    b"sRGB",
+)
 MP4 = re.compile(rb"(?:moov|trak|mdia|minf|stbl|mvhd|tkhd|mdhd|hdlr|stsd|stts|stsc|stsz|stco|stss|ctts|avcC|elst|edts)")
 
 
@@ -137,7 +150,17 @@ def ply(data: bytes, rng: Random, pool: Sequence[bytes]) -> bytes:
         return text(data, rng, pool) if b"format ascii" in data[:64] else any_bytes(data, rng, pool)
     head, body = data[:end], data[end:]
     if rng.random() < 0.3:
-        types = (b"char", b"uchar", b"short", b"int", b"uint", b"float", b"double", b"list uchar int", b"list double float")
+        types = (
+            b"char",
+            b"uchar",
+            b"short",
+            b"int",
+            b"uint",
+            b"float",
+            b"double",
+            b"list uchar int",
+            b"list double float",
+        )
         lines = head.split(b"\n")
         k = rng.randrange(len(lines))
         if lines[k].startswith(b"property"):
@@ -159,11 +182,25 @@ def npy(data: bytes, rng: Random, pool: Sequence[bytes]) -> bytes:
     length = int.from_bytes(data[8:10], "little")
     head, body = data[10 : 10 + length], data[10 + length :]
     if rng.random() < 0.5:
-        kind = rng.choice((b"<f4", b">f8", b"<f2", b"|O", b"<U4", b"|S8", b"<i8", b"|b1", b"<c8", b"<M8[s]", b"|V8", b"|u1"))
+        kind = rng.choice(
+            (b"<f4", b">f8", b"<f2", b"|O", b"<U4", b"|S8", b"<i8", b"|b1", b"<c8", b"<M8[s]", b"|V8", b"|u1")
+        )
         head = re.sub(rb"'[<>|][a-zA-Z]\d+'", b"'" + kind + b"'", head)
     if rng.random() < 0.5:
-        odd = (b"(-1, 4)", b"(2, 9999999999999)", b"()", b"(4,)", b"(0, 0)", b"(2, 2, 2)", b"(2.5, 1)", b"('a',)", b"(True, 4)")
-        shape = rng.choice((*odd, b"(9223372036854775807,)", b"(4294967296, 4294967296)", b"None", b"[2, 4]", b"(3, 0)"))
+        odd = (
+            b"(-1, 4)",
+            b"(2, 9999999999999)",
+            b"()",
+            b"(4,)",
+            b"(0, 0)",
+            b"(2, 2, 2)",
+            b"(2.5, 1)",
+            b"('a',)",
+            b"(True, 4)",
+        )
+        shape = rng.choice(
+            (*odd, b"(9223372036854775807,)", b"(4294967296, 4294967296)", b"None", b"[2, 4]", b"(3, 0)")
+        )
         head = re.sub(rb"\([^)]*\)", lambda match: shape, head)
     if rng.random() < 0.3:
         head = text(head.rstrip(), rng, pool)

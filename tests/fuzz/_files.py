@@ -151,7 +151,11 @@ def of_points(root: Path) -> None:
     lists = np.empty(2, dtype=[("vertex_indices", "O")])
     lists["vertex_indices"] = [np.array([0, 1, 2], "i4"), np.array([1, 2, 3, 4], "i4")]
     vertex = PlyElement.describe(table, "vertex")
-    ways: dict[str, dict[str, Any]] = {"text": {"text": True}, "little": {"byte_order": "<"}, "big": {"byte_order": ">"}}
+    ways: dict[str, dict[str, Any]] = {
+        "text": {"text": True},
+        "little": {"byte_order": "<"},
+        "big": {"byte_order": ">"},
+    }
     for name, way in ways.items():
         PlyData([vertex], **way).write(root / f"{name}.ply")
         PlyData([PlyElement.describe(faces, "face"), vertex], **way).write(root / f"{name}_faces.ply")

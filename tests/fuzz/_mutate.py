@@ -180,7 +180,9 @@ def changed(whole: Any, rng: Random) -> Any:
         k = rng.randrange(len(at) + 1)
         holder[key] = at[:k] + rng.choice(_odd.NAMES) + at[k:]
     elif way == 10 and isinstance(at, (int, float)):
-        holder[key] = rng.choice((-at, at * 1e6, at * 1e-6, at + 1, str(at), int(at) if at == at and abs(at) < 1e300 else 0))
+        holder[key] = rng.choice(
+            (-at, at * 1e6, at * 1e-6, at + 1, str(at), int(at) if at == at and abs(at) < 1e300 else 0)
+        )
     else:
         holder[key] = rng.choice(_odd.FLOATS)
     return whole
@@ -192,7 +194,9 @@ def yaml_values(data: bytes, rng: Random, pool: Sequence[bytes]) -> bytes:
 
     if rng.random() < 0.4:
         if rng.random() < 0.15:
-            extra = rng.choice((b"!!python/object:os.system {}\n", b"&a [*a]\n", b"a: &a [1]\nb: *a\n", b"? [1]\n: 2\n"))
+            extra = rng.choice(
+                (b"!!python/object:os.system {}\n", b"&a [*a]\n", b"a: &a [1]\nb: *a\n", b"? [1]\n: 2\n")
+            )
             return extra + data if rng.random() < 0.5 else data + extra
         return text(data, rng, pool)
     try:

@@ -142,7 +142,9 @@ class Runner:
             return None
         broken = one.home / "broken"
         if os.WIFEXITED(status) and broken.exists() or number not in one.left:
-            raise RuntimeError(f"the harness failed at input {number}: {broken.read_text() if broken.exists() else status}")
+            raise RuntimeError(
+                f"the harness failed at input {number}: {broken.read_text() if broken.exists() else status}"
+            )
         self._ended(one, number, status)
         left = range(number + one.left.step, one.left.stop, one.left.step)
         if not left:

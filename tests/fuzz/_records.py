@@ -346,7 +346,9 @@ def _asked() -> Any:
     scene, _ = small_scene()
     settings = replace(SETTINGS, scenes={**SETTINGS.scenes, "small": SceneEntry(str(scene.root.resolve()))})
     file = scene.root.parent / "one.yaml"
-    file.write_text("scenes: [small]\nselectors: [uniform]\nratios: [0.5]\nseeds: 1\nbackends: [splat]\nbudget: {iterations: 5}\n")
+    file.write_text(
+        "scenes: [small]\nselectors: [uniform]\nratios: [0.5]\nseeds: 1\nbackends: [splat]\nbudget: {iterations: 5}\n"
+    )
     return Asked(_study.load(str(file), settings), scene.root.parent / "results", settings)
 
 

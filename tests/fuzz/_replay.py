@@ -29,5 +29,7 @@ def replay(file: Path) -> int:
         os.dup2(said, 1)
         os.chdir("/")
         shutil.rmtree(home, ignore_errors=True)
-    print(f"{outcome}; {finding.kind} at {finding.where}\n{finding.text}" if finding else f"{outcome}; nothing is wrong")
+    print(
+        f"{outcome}; {finding.kind} at {finding.where}\n{finding.text}" if finding else f"{outcome}; nothing is wrong"
+    )
     return int(finding is not None)

@@ -38,7 +38,8 @@ def looked_at(given: Input, sub: str = ".", format: str = "", **reading: Any) ->
     else:
         module = plugins.load("scenes.formats", format)
         module.detect(root)
-        scene = hold_out(module.read(root, **reading), "")
+        with np.errstate(all="ignore"):  # as open_scene has it
+            scene = hold_out(module.read(root, **reading), "")
         check_scene(scene)
     check(scene, given.root)
     json.dumps(summary(scene), allow_nan=False)
@@ -113,7 +114,9 @@ def _check_split(split: Split, root: Path) -> None:
 def _within(path: Path, root: Path) -> bool:
     """Whether a path stays in the folder, or in the cache that readers have beside it."""
     normal = os.path.normpath(path)
-    return any(normal == str(folder) or normal.startswith(f"{folder}{os.sep}") for folder in (root, root.parent / "cache"))
+    return any(
+        normal == str(folder) or normal.startswith(f"{folder}{os.sep}") for folder in (root, root.parent / "cache")
+    )
 
 
 def _contained(folder: Path) -> None:
@@ -381,9 +384,7 @@ READERS = (
     Reader("seven-scenes", of_seven, opens("room0", "seven-scenes"), ("seven-scenes",)),
     Reader("euroc", of_euroc, opens(".", "euroc"), ("euroc",)),
     Reader("kitti", of_kitti, opens("sequences/04", "kitti"), ("kitti",)),
-    Reader(
-        "scannetpp-dslr", lambda root: of_scannetpp("undistorted", root), opens(".", "scannetpp"), ("scannetpp",)
-    ),
+    Reader("scannetpp-dslr", lambda root: of_scannetpp("undistorted", root), opens(".", "scannetpp"), ("scannetpp",)),
     Reader("scannetpp-fisheye", lambda root: of_scannetpp("fisheye", root), opens(".", "scannetpp"), ("scannetpp",)),
     Reader("scannetpp-iphone", lambda root: of_scannetpp("iphone", root), opens(".", "scannetpp"), ("scannetpp",)),
     Reader("video-mp4", lambda root: of_video(("h264", "hevc"), root), opens_video, ("video",), "av", True),
