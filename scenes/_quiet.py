@@ -15,8 +15,10 @@ _kept = -1  # a copy of stderr, while they are
 @functools.cache
 def hush_pillow() -> None:
     """PIL warns of EXIF that is cut short and the like, once for each place in its code, without the file's name."""
+    import logging
     import warnings
 
+    logging.getLogger("PIL").addHandler(logging.NullHandler())
     warnings.filterwarnings("ignore", module=r"PIL\.")
 
 

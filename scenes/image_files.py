@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import os
 import struct
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
@@ -75,6 +76,18 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
     except (OSError, SyntaxError, ValueError, KeyError, EOFError, struct.error) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise UserError(f"image '{path}' cannot be read: {reason}") from None
+    except Exception as error:
+        if not _of_pillow(error):
+            raise
+        raise UserError(f"image '{path}' cannot be read: it is damaged ({error})") from None
+
+
+def _of_pillow(error: Exception) -> bool:
+    """Whether it was raised in PIL's own code, which a damaged file makes stumble in any way."""
+    at = error.__traceback__
+    while at is not None and at.tb_next is not None:
+        at = at.tb_next
+    return at is not None and f"{os.sep}PIL{os.sep}" in at.tb_frame.f_code.co_filename
 
 
 def _check_scans(path: Path) -> None:

@@ -13,7 +13,7 @@ from random import Random
 from unittest import mock
 
 from tests.fuzz._reader import Input, Reader, changes, lay_out
-from tests.fuzz._worker import Board, Finding, save, valid_capture, work
+from tests.fuzz._worker import Board, Finding, mind_warnings, save, valid_capture, work
 
 LIMIT_S = 10.0  # of CPU for one input; or so many times that by the clock, since machines are busy
 WAITS = 12
@@ -59,6 +59,7 @@ class Runner:
         self.reader, self.seed, self.out, self.jobs = reader, seed, out, jobs
         self.home = Path(tempfile.mkdtemp(prefix=f"viewbench-fuzz-{reader.name}-", dir=SHORT))
         self.tally = Tally(reader.name)
+        mind_warnings()
         try:
             self.valid = valid_capture(reader, self.home / "made")
             self._warm()

@@ -2,6 +2,7 @@
 
 import base64
 import faulthandler
+import functools
 import hashlib
 import json
 import mmap
@@ -55,6 +56,14 @@ class Board:
         return STATE.unpack_from(self.memory, 0)
 
 
+@functools.cache
+def mind_warnings() -> None:
+    """Has every warning printed that a user would see once; before any reader sets what it does not want to hear."""
+    warnings.simplefilter("always")
+    for kind in (DeprecationWarning, PendingDeprecationWarning, ResourceWarning):
+        warnings.simplefilter("ignore", kind)
+
+
 class Bench:
     """Where a process tries inputs: a copy of the capture, and folders in which nothing may be left."""
 
@@ -71,9 +80,7 @@ class Bench:
         for stream in (1, 2):
             os.dup2(self.said.fileno(), stream)
         os.set_blocking(self.said.fileno(), True)
-        warnings.simplefilter("always")
-        for kind in (DeprecationWarning, PendingDeprecationWarning, ResourceWarning):
-            warnings.simplefilter("ignore", kind)
+        mind_warnings()
 
     def attempt(self, change: Changes, rng: Random) -> tuple[str, Finding | None]:
         """("opened" or "refused", what is wrong) of one input; the capture is valid again afterwards."""
@@ -109,8 +116,11 @@ class Bench:
 
     def _left(self, before: set[str]) -> Finding | None:
         extra = sorted(set(self._files()) - before)
-        for path in extra:
-            shutil.rmtree(path) if os.path.isdir(path) and not os.path.islink(path) else os.unlink(path)  # noqa: PTH
+        for path in map(Path, extra):
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            else:
+                path.unlink(missing_ok=True)
         return Finding("left behind", Path(extra[0]).suffix, f"{extra[0]} is left") if extra else None
 
     def _words(self) -> Finding | None:
@@ -120,7 +130,7 @@ class Bench:
             return None
         text = os.pread(self.said.fileno(), 4000, 0).decode(errors="replace").strip()
         first = "".join("#" if letter.isdigit() else letter for letter in text.split("\n")[0])
-        return Finding("printed", first.replace(str(self.home), "")[-100:], text[:1500])
+        return Finding("printed", first.rsplit("/", 1)[-1][:80], text[:1500])
 
 
 def _sentence(text: str) -> Finding | None:
