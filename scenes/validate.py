@@ -29,6 +29,9 @@ def _check_split(scene: Scene, split: Split) -> None:
     bad = ~np.all(np.isfinite(cameras.c2w), axis=(1, 2))
     if bad.any():
         raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' has NaN or infinite entries")
+    if split.times is not None and not np.isfinite(split.times).all():
+        late = _first(split, ~np.isfinite(split.times))
+        raise UserError(f"scene '{scene.name}': the time of frame '{late}' is NaN or infinite")
     with np.errstate(all="ignore"):  # huge numbers in a damaged file overflow, and are found so
         gram = cameras.rotations.transpose(0, 2, 1) @ cameras.rotations
         bad = ~(np.abs(gram - np.eye(3)).max(axis=(1, 2), initial=0) <= RIGID)

@@ -113,7 +113,7 @@ def opens_picture(given: Input) -> None:
     def loaded() -> None:
         split = Split((path.name,), (path,), nominal_cameras(np.array([image_size(path)])))
         made, _ = load_images(split, np.array([0]), 16)
-        if made.shape[2:] != (16, 3) or not (np.isfinite(made).all() and 0 <= made.min() and made.max() <= 1):
+        if made.shape[2:] != (16, 3) or not (np.isfinite(made).all() and made.min() >= 0 and made.max() <= 1):
             raise InvalidError("pixels of another shape, NaN, or outside of [0, 1]")
 
     def embedded() -> None:

@@ -142,7 +142,7 @@ class Runner:
         if not status and number == one.left.stop:
             return None
         broken = one.home / "broken"
-        if os.WIFEXITED(status) and broken.exists() or number not in one.left:
+        if (os.WIFEXITED(status) and broken.exists()) or number not in one.left:
             raise RuntimeError(
                 f"the harness failed at input {number}: {broken.read_text() if broken.exists() else status}"
             )

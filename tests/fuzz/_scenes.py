@@ -21,7 +21,7 @@ from viewbench.scenes.digest import scene_sha256
 from viewbench.scenes.images import load_images
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.splits import hold_out
-from viewbench.scenes.subset import check_target, write_scene, written_format
+from viewbench.scenes.subset import write_scene, written_format
 from viewbench.scenes.summary import summary
 from viewbench.scenes.types import Scene, Split
 from viewbench.scenes.validate import check_present, check_scene

@@ -1,0 +1,299 @@
+"""Inputs that fuzzing found, each as small as it gets: what was an exception, or words of a library, is a sentence."""
+
+import contextlib
+import io
+import json
+import os
+import struct
+import subprocess
+import sys
+import zipfile
+import zlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.fuzz import _files, _records, _scenes
+from viewbench.backends import _snapshot
+from viewbench.common.errors import UserError
+from viewbench.common.files import sealed, sha256_file, unsealed
+from viewbench.common.settings import PACKAGE
+from viewbench.scenes import digest, features
+from viewbench.scenes._quiet import silenced
+from viewbench.scenes.download import unpack
+from viewbench.scenes.download.unfinished import State
+from viewbench.scenes.image_files import check_whole, image_size
+from viewbench.scenes.images import load_images
+from viewbench.scenes.load import open_scene
+from viewbench.scenes.seen import FILE, shares_of
+from viewbench.scenes.validate import check_present, check_scene
+from viewbench.selectors._selection import load_selection
+
+HEADS = ["{'descr': '|b1', 'shape': (3, }, }", "{'descr': '<f2', 'fortran_order': False, 'shape': (True, 4), }"]
+
+
+def npy(head: str) -> bytes:
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head.encode() + b"\0" * 64
+
+
+def refused(call, *arguments) -> str:
+    with pytest.raises(UserError) as caught:
+        call(*arguments)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_heads_of_arrays_at_which_numpy_fails_in_its_own_ways(tmp_path, head):
+    (tmp_path / "a.npy").write_bytes(npy(head))
+    assert features.cached(tmp_path / "a.npy") is None
+    assert "a.npy" in refused(features.load_user_features, tmp_path / "a.npy", 3)
+    with zipfile.ZipFile(tmp_path / _snapshot.FILE, "w") as archive:
+        archive.writestr("plain.npy", npy(head))
+    assert _snapshot.read(tmp_path, lambda stored, plain: stored) is None
+
+
+@pytest.mark.parametrize("row", [np.zeros((2, 2), np.float32), np.array([np.nan], np.float32), np.zeros(3, np.int32)])
+def test_a_row_of_the_cache_that_is_none_is_made_again(tmp_path, row):
+    np.save(tmp_path / "row.npy", row)
+    assert features.cached(tmp_path / "row.npy") is None
+
+
+def test_a_rig_that_does_not_have_its_camera(tmp_path):
+    _scenes.of_rig("txt", tmp_path)
+    rigs = tmp_path / "model" / "sparse" / "0" / "rigs.txt"
+    rows = rigs.read_text().split("\n")
+    words = rows[-2].split()
+    rigs.write_text("\n".join([*rows[:-2], " ".join([*words[:4], "CAMERA", "2", "0"]), ""]))
+    assert "rig" in refused(open_scene, str(tmp_path / "model"), _scenes.SETTINGS)
+
+
+def test_lenses_and_times_of_nan(tmp_path):
+    scene = _scenes.room(tmp_path)
+    lens = np.zeros((3, 5))
+    lens[1, 2] = np.nan
+    bad = replace(scene.train, cameras=replace(scene.train.cameras, distortion=lens))
+    assert scene.train.names[1] in refused(check_scene, replace(scene, train=bad))
+    late = replace(scene.train, times=np.array([0, 1, np.inf]))
+    assert scene.train.names[2] in refused(check_scene, replace(scene, train=late))
+
+
+def test_a_transform_between_cameras_that_has_no_inverse(tmp_path):
+    _scenes.of_seven(tmp_path)
+    matrix = np.eye(4)
+    matrix[3, 3] = 0
+    np.savetxt(tmp_path / "room0" / "depth_to_color.txt", matrix)
+    assert "depth_to_color.txt" in refused(open_scene, str(tmp_path / "room0"), _scenes.SETTINGS)
+
+
+def test_a_scale_of_depth_so_small_that_its_unit_is_infinite(tmp_path):
+    _scenes.of_rgbd("replica", tmp_path)
+    file = tmp_path / "cam_params.json"
+    table = json.loads(file.read_text())
+    table["camera"]["scale"] = 5e-324
+    file.write_text(json.dumps(table))
+    assert open_scene(str(tmp_path / "room0"), _scenes.SETTINGS).depth_unit == 0
+
+
+def test_a_pose_of_infinities_is_said_once_and_without_a_warning(tmp_path, recwarn):
+    _scenes.of_kitti(tmp_path)
+    poses = tmp_path / "poses" / "04.txt"
+    rows = poses.read_text().split("\n")
+    poses.write_text("\n".join([" ".join(["inf"] * 12), *rows[1:]]))
+    assert "000000.png" in refused(open_scene, str(tmp_path / "sequences" / "04"), _scenes.SETTINGS)
+    assert [str(one.message) for one in recwarn if one.category is RuntimeWarning] == []
+
+
+def test_a_lens_whose_formula_overflows(tmp_path, recwarn):
+    scene = _scenes.room(tmp_path)
+    lens = np.full((3, 5), 1e308)
+    bad = replace(scene.train, cameras=replace(scene.train.cameras, distortion=lens))
+    assert "distortion" in refused(load_images, bad, np.array([0]), 16)
+    assert [str(one.message) for one in recwarn if one.category is RuntimeWarning] == []
+
+
+def test_a_png_at_whose_chunk_pil_fails_by_an_index(tmp_path):
+    """A profile without its name's end, behind the pixels: it is looked at when they are read."""
+    made = io.BytesIO()
+    Image.new("RGB", (64, 48)).save(made, format="PNG")
+    kind, body = b"iCCP", b""
+    chunk = struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+    end = made.getvalue().index(b"IEND") - 4
+    (tmp_path / "a.png").write_bytes(made.getvalue()[:end] + chunk + made.getvalue()[end:])
+    assert image_size(tmp_path / "a.png") == (64, 48)
+    assert "a.png" in refused(check_whole, tmp_path / "a.png")
+
+
+def tags_of_nothing(path) -> None:
+    """A photo whose EXIF says that a tag's data lie beyond its end."""
+    data = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x0f\0\x02\xff\xff\xff\x00\0\0\0\x08"
+    Image.new("RGB", (8, 8)).save(path, exif=data)
+
+
+def test_pil_does_not_warn_of_exif(tmp_path):
+    """In a process of its own: pytest takes warnings to itself."""
+    tags_of_nothing(tmp_path / "a.jpg")
+    with pytest.warns(UserWarning), Image.open(tmp_path / "a.jpg") as image:
+        image.getexif()
+    code = f"""
+from pathlib import Path
+from viewbench.scenes.orientation import upright_size
+print(upright_size(Path({str(tmp_path / "a.jpg")!r})))
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=PACKAGE, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("(8, 8)\n", "")
+
+
+def test_libtiff_does_not_write_to_stderr(tmp_path, capfd):
+    _files.pixels("1").save(tmp_path / "fax.tif", compression="group4")
+    data = bytearray((tmp_path / "fax.tif").read_bytes())
+    with Image.open(tmp_path / "fax.tif") as image:
+        at = image.tag_v2[273][0]
+    data[at : at + 8] = b"\xff" * 8
+    (tmp_path / "fax.tif").write_bytes(data)
+    with contextlib.suppress(UserError):
+        check_whole(tmp_path / "fax.tif")
+    assert capfd.readouterr().err == ""
+
+
+def test_stderr_comes_back_after_the_last_of_several(capfd):
+    with silenced(True):
+        with silenced(True), silenced(False):
+            os.write(2, b"lost\n")
+        os.write(2, b"lost too\n")
+    os.write(2, b"kept\n")
+    assert capfd.readouterr().err == "kept\n"
+
+
+@pytest.mark.parametrize("record", [[], 3, None, {"a": float("nan"), "content_sha256": "0" * 64}])
+def test_records_that_were_never_sealed(record):
+    assert "x.json" in refused(unsealed, record, "x.json")
+    assert unsealed(sealed({"a": 1}), "x.json") == {"a": 1}
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("notes", {"below_precision_from": "~"}),
+        ("notes", []),
+        ("gains", "x"),
+        ("names", [1, 2]),
+        ("seconds", {"select": "a"}),
+        ("cut_from", None),
+    ],
+)
+def test_selections_with_parts_of_other_kinds(tmp_path, key, value):
+    _records.of_selection(tmp_path)
+    file = tmp_path / "selection.json"
+    load_selection(file)
+    file.write_text(json.dumps({**json.loads(file.read_text()), key: value}))
+    assert key in refused(load_selection, file)
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.5, float("nan"), float("inf")])
+def test_shares_that_are_none(tmp_path, share):
+    (tmp_path / FILE).write_text(json.dumps({"seen": {"a": share}}))
+    assert FILE in refused(shares_of, tmp_path, ["a"])
+
+
+@pytest.mark.parametrize(
+    "record", ["[]", '{"force": NaN}', '{"unpacked": [[]], "directory": 3}', '{"force": -Infinity']
+)
+def test_a_damaged_state_of_a_download_is_none(tmp_path, record):
+    (tmp_path / "state.json").write_text(record)
+    state = State(tmp_path / "state.json", tmp_path / "staging")
+    assert (state.directory, state.unpacked) == (None, [])
+    state.begin(False)
+    state.has_unpacked("a.zip")
+    assert State(tmp_path / "state.json", tmp_path / "staging").unpacked == ["a.zip"]
+
+
+@pytest.mark.parametrize("entry", [3, [], ["x"], {"a": 1}, [1, 2, 3, 4, "no hash"]])
+def test_damaged_hashes_of_the_cache_are_made_again(tmp_path, monkeypatch, entry):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(digest, "REMEMBERED_BYTES", 0)
+    monkeypatch.setattr(digest, "SETTLED_S", -9)  # the file is of now
+    file = tmp_path / "a.bin"
+    file.write_bytes(b"a")
+    os.utime(file, (1e9, 1e9))
+    true = digest.file_sha256(file)
+    (known,) = (tmp_path / "cache").rglob("*.json")
+    assert os.fsencode(file).hex() in json.loads(known.read_text())
+    known.write_text(json.dumps({os.fsencode(file).hex(): entry}))
+    assert digest.file_sha256(file) == true
+
+
+@pytest.mark.parametrize("packed", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA, zipfile.ZIP_DEFLATED])
+def test_archives_whose_decoder_fails_in_its_own_way(tmp_path, packed):
+    content = np.random.default_rng(0).bytes(3000)
+    with zipfile.ZipFile(tmp_path / "a.zip", "w", packed) as archive:
+        archive.writestr("room/a.bin", content)
+    whole = (tmp_path / "a.zip").read_bytes()
+    for at in range(45, 400, 7):
+        (tmp_path / "a.zip").write_bytes(whole[:at] + b"\xff\xff\xff" + whole[at + 3 :])
+        with contextlib.suppress(unpack.DamagedError):
+            taken(tmp_path)
+            assert (tmp_path / "out" / "a.bin").read_bytes() == content  # bits that stand for nothing
+
+
+def taken(folder, done=lambda count: None):
+    with unpack.damaged("a.zip"), zipfile.ZipFile(folder / "a.zip") as archive:
+        unpack.extract(archive, unpack.members(archive, "room/", (), "a.zip"), folder / "out", "a.zip", done)
+
+
+def test_a_full_disk_is_no_damaged_archive(tmp_path):
+    def full(count):
+        raise OSError(28, "No space left on device", "a")
+
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("room/a.bin", b"a")
+    with pytest.raises(OSError, match="No space"):
+        taken(tmp_path, full)
+
+
+FIGURES = [
+    ("metrics.json", "psnr_db", "x"),
+    ("metrics.json", "seconds", None),
+    ("metrics.json", "lpips", ...),
+    ("selection.json", "seconds", {"select": "a"}),
+    ("train.json", "seconds", True),
+    ("train.json", "commit", []),
+]
+
+
+@pytest.mark.parametrize(("file", "key", "value"), FIGURES)
+def test_cells_that_lack_a_figure(tmp_path, file, key, value):
+    pytest.importorskip("jsonschema")
+    from viewbench.workflow import _collect
+
+    asked = _records._asked()
+    _records.of_cell(tmp_path)
+    assert _collect._figures(_records.CELL, tmp_path, asked)["psnr_db"] == 20
+    record = json.loads((tmp_path / file).read_text())
+    record = {name: one for name, one in record.items() if name != key} | ({} if value is ... else {key: value})
+    (tmp_path / file).write_text(json.dumps(record))
+    if file == "train.json":  # which the scores name
+        scores = json.loads((tmp_path / "metrics.json").read_text())
+        scores["train_sha256"] = sha256_file(tmp_path / file)
+        (tmp_path / "metrics.json").write_text(json.dumps(scores))
+    assert file in refused(_collect._figures, _records.CELL, tmp_path, asked)
+
+
+@pytest.mark.parametrize("file", ["packets.npz", "facts.json", "lost.json", "frame_000001.jpg"])
+@pytest.mark.parametrize("content", [b"", b"[[1]]", b"{}", b"PK\x05\x06" + b"\0" * 18])
+def test_what_is_damaged_in_the_cache_of_a_video_is_found_out_anew(tmp_path, monkeypatch, file, content):
+    pytest.importorskip("av")
+    from viewbench.scenes.formats import video
+
+    if file.endswith("jpg") and content:
+        pytest.skip("a picture that is there and none is said by whoever reads it")
+    _records.of_caches(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    before = video.read(tmp_path / "walk.mp4", cache_gb=1)
+    (damaged,) = (tmp_path / "cache").rglob(file)
+    damaged.write_bytes(content)
+    after = video.read(tmp_path / "walk.mp4", cache_gb=1)
+    assert after.train.names == before.train.names
+    np.testing.assert_array_equal(after.train.times, before.train.times)
+    check_present(after)
