@@ -12,7 +12,7 @@ from ..image_files import leaves
 from ..splits import LEAST_TRACK
 from ..types import Points, Scene, Split
 from . import colmap
-from ._frames import natural, split
+from ._frames import natural, split, times_of
 from ._intrinsics import Intrinsics
 
 PHONE = "pose_intrinsic_imu.json"
@@ -86,8 +86,7 @@ def phone(root: Path, folder: Path) -> Scene:
     made = split(root, paths, poses, first, depths=depths)
     cameras = replace(made.cameras, fx=k[:, 0, 0], fy=k[:, 1, 1], cx=k[:, 0, 2], cy=k[:, 1, 2])
     masks = tuple(there(folder / "rgb_masks", f"{name}.png") for name in names)
-    times = [row.get("timestamp") for row in rows]
-    stamps = np.array(times, np.float64) if all(isinstance(time, (int, float)) for time in times) else None
+    stamps = times_of([row.get("timestamp") for row in rows])
     train = replace(made, cameras=cameras, times=stamps, masks=masks if any(masks) else ())
     dropped = len(every) - len(names)
     return Scene(

@@ -23,7 +23,7 @@ from tests.fuzz._reader import Changes, Input, InvalidError, Reader, apply, chan
 from viewbench.common.errors import UserError
 from viewbench.common.settings import PACKAGE
 
-MEMORY = 2 << 30  # bytes of address space that an input may take beyond what the process has before
+MEMORY = 4 << 30  # bytes of address space that an input may take beyond what the process has before
 LONGEST = 4100  # characters of a sentence
 STATE = struct.Struct("<qdqqdd")  # number of the input, when it began, opened, refused, seconds of CPU, the most
 

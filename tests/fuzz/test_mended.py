@@ -79,6 +79,16 @@ def test_lenses_and_times_of_nan(tmp_path):
     assert scene.train.names[2] in refused(check_scene, replace(scene, train=late))
 
 
+@pytest.mark.parametrize("time", [10**400, float("inf"), "7", None])
+def test_times_of_a_phone_that_are_none(tmp_path, time):
+    _scenes.of_scannetpp("iphone", tmp_path)
+    file = tmp_path / "iphone" / "pose_intrinsic_imu.json"
+    table = json.loads(file.read_text())
+    table["frame_000000"]["timestamp"] = time
+    file.write_text(json.dumps(table))
+    assert open_scene(str(tmp_path), _scenes.SETTINGS).train.times is None
+
+
 def test_a_transform_between_cameras_that_has_no_inverse(tmp_path):
     _scenes.of_seven(tmp_path)
     matrix = np.eye(4)
