@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test lint types pytest bench gpu quality size external wheels datasheet format clean clean-results
+.PHONY: help setup dev reports dashboard test lint types pytest bench gpu quality size fuzz external wheels datasheet format clean clean-results
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -21,6 +21,7 @@ help:
 	@echo "make gpu         what needs a GPU, tried and recorded (10 minutes; GPU=--real for a capture too)"
 	@echo "make quality     PSNR of the CPU backend by seconds, its defaults beside other settings (8 minutes)"
 	@echo "make size        seconds to 25 dB by size of the pictures, memory by number of views (10 minutes)"
+	@echo "make fuzz        100,000 damaged inputs for every reader (FUZZ='--inputs 1000 kitti' for a part of it)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make wheels      the package and, apart from it, the rendered rooms; make datasheet describes them"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
@@ -79,6 +80,10 @@ quality: dev
 
 size: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_size.py $(BENCH)
+
+# Reproductions and a table in build/fuzz.
+fuzz: dev
+	$(THREADS) $(BIN)/python -m tests.fuzz $(FUZZ)
 
 # A program that is not ours behind `command:`; its environment is kept in build/external.
 external: dev

@@ -9,7 +9,6 @@ from typing import Any
 from ...common.errors import UserError
 from ...common.files import read_json, write_json
 
-
 FORM: dict[str, Callable[[Any], bool]] = {
     "force": lambda value: isinstance(value, bool),
     "directory": lambda value: isinstance(value, str),
