@@ -122,7 +122,7 @@ def _read(path: str) -> dict[str, DataSet]:
         raw = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise UserError(f"catalogue '{path}' cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise UserError(f"catalogue '{path}' is not valid TOML: {error}") from None
     try:
         return {name: _dataset(name, dict(values)) for name, values in raw.items()}

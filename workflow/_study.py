@@ -150,7 +150,7 @@ def load(study: str, settings: Settings) -> Study:
     except OSError:
         known = names()
         raise UserError(f"unknown study '{study}'{nearest(study, known)} (there are: {', '.join(known)})") from None
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, ArithmeticError, AttributeError, RecursionError) as error:
         raise UserError(f"study '{path}' is not valid YAML: {error}") from None
     schema = json.loads((FOLDER / "schemas" / "study.schema.json").read_text(encoding="utf-8"))
     errors = list(jsonschema.Draft202012Validator(schema).iter_errors(raw))

@@ -30,6 +30,9 @@ DAMAGED = (
 )
 
 
+OF_CONTENT = (None, errno.EINVAL, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG)
+
+
 class DamagedError(UserError):
     """What came is not the archive that it was."""
 
@@ -143,8 +146,9 @@ def damaged(name: str, member: str = "") -> Iterator[None]:
 
 
 def _of_content(error: OSError) -> bool:
-    """Whether it is about what is in the archive: bz2 says so without a number, a seek to nowhere with EINVAL."""
-    return isinstance(error, gzip.BadGzipFile) or error.errno is None or error.errno == errno.EINVAL
+    """Whether it is about what is in the archive: bz2 says so without a number, a seek to nowhere with EINVAL; and
+    names that are a file's and a folder's, or that no file system takes."""
+    return isinstance(error, gzip.BadGzipFile) or error.errno in OF_CONTENT
 
 
 def extract_tar(path: Path, prefix: str, also: tuple[str, ...], folder: Path, name: str, done: Done) -> None:

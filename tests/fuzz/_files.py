@@ -292,7 +292,7 @@ def opens_zip(given: Input) -> None:
         missing = {at: info for at, info in chosen.items() if not unpack.is_right(target / at, info)}
         unpack.extract(archive, missing, target, name, lambda count: None)
         _inside(given.spare)
-    for path in list(target.rglob("*.zip")):
+    for path in [path for path in target.rglob("*.zip") if path.is_file()]:
         unpack.unpack_nested(path, name, lambda count: None)
     _inside(given.spare)
 

@@ -491,7 +491,7 @@ READERS = (
     Reader("selection", of_selection, opens_selection, whole=True),
     Reader("settings", of_settings, opens_settings, whole=True),
     Reader("study", of_study, opens_study, package="jsonschema", whole=True),
-    Reader("lists", of_lists, opens_lists),
+    Reader("lists", of_lists, opens_lists, whole=True),
     Reader("rules", of_rules, opens_rules, whole=True),
     Reader("catalogue", of_catalogue, opens_catalogue),
     Reader("downloads", of_downloads, opens_downloads),

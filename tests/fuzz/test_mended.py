@@ -17,6 +17,7 @@ from PIL import Image
 
 from tests.fuzz import _files, _records, _scenes
 from viewbench.backends import _snapshot
+from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.common.files import sealed, sha256_file, unsealed
 from viewbench.common.settings import PACKAGE
@@ -28,8 +29,10 @@ from viewbench.scenes.image_files import check_whole, image_size
 from viewbench.scenes.images import load_images
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.seen import FILE, shares_of
+from viewbench.scenes.splits import held_out
 from viewbench.scenes.validate import check_present, check_scene
 from viewbench.selectors._selection import load_selection
+from viewbench.workflow import _study
 
 HEADS = ["{'descr': '|b1', 'shape': (3, }, }", "{'descr': '<f2', 'fortran_order': False, 'shape': (True, 4), }"]
 
@@ -199,6 +202,39 @@ def test_selections_with_parts_of_other_kinds(tmp_path, key, value):
     load_selection(file)
     file.write_text(json.dumps({**json.loads(file.read_text()), key: value}))
     assert key in refused(load_selection, file)
+
+
+@pytest.mark.parametrize("key", ["gains", "seed", "other"])
+def test_selections_of_nan(tmp_path, key):
+    _records.of_selection(tmp_path)
+    file = tmp_path / "selection.json"
+    file.write_text(
+        json.dumps({**json.loads(file.read_text()), key: [float("nan")] if key == "gains" else float("inf")})
+    )
+    assert "selection.json" in refused(load_selection, file)
+
+
+@pytest.mark.parametrize("rule", ["every:" + "9" * 30, "blocks:" + "9" * 30, "every:" + "9" * 5000])
+def test_rules_with_numbers_that_no_machine_holds(rule):
+    assert "holdout" in refused(held_out, rule, 20)
+
+
+@pytest.mark.parametrize("digits", [30, 5000])
+def test_settings_and_studies_with_numbers_that_no_machine_holds(tmp_path, digits):
+    pytest.importorskip("jsonschema")
+    (tmp_path / "a.toml").write_text(f"[compute]\nthreads = {'9' * 5000}\n")
+    assert "a.toml" in refused(settings_file.load, tmp_path / "a.toml")
+    study = _study.STUDIES / "tiny.yaml"
+    rows = [row for row in study.read_text().split("\n") if not row.startswith("seeds:")]
+    (tmp_path / "a.yaml").write_text("\n".join([*rows, f"seeds: {'9' * digits}", ""]))
+    assert "a.yaml" in refused(_study.load, str(tmp_path / "a.yaml"), _scenes.SETTINGS)
+
+
+def test_an_archive_with_a_file_and_a_folder_of_one_name(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("room/a", b"a")
+        archive.writestr("room/a/b", b"b")
+    assert "a.zip" in refused(taken, tmp_path)
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.5, float("nan"), float("inf")])
