@@ -50,7 +50,7 @@ def render(model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
     settings = read_json(model / "splat.json", "splat settings")
     try:
         rendering = Rendering(**{name: kind(settings[name]) for name, kind in Rendering.__annotations__.items()})
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise UserError(f"'{model / 'splat.json'}' is not what training wrote; train again") from None
     return draw(ply.read(model / "model.ply"), cameras, rendering)
 

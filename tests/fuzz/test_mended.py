@@ -17,6 +17,7 @@ from PIL import Image
 
 from tests.fuzz import _files, _records, _scenes
 from viewbench.backends import _snapshot
+from viewbench.common import catalogue
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.common.files import sealed, sha256_file, unsealed
@@ -24,6 +25,7 @@ from viewbench.common.settings import PACKAGE
 from viewbench.scenes import digest, features
 from viewbench.scenes._quiet import silenced
 from viewbench.scenes.download import unpack
+from viewbench.scenes.download.receipt import is_there
 from viewbench.scenes.download.unfinished import State
 from viewbench.scenes.image_files import check_whole, image_size
 from viewbench.scenes.images import load_images
@@ -296,6 +298,62 @@ def test_a_full_disk_is_no_damaged_archive(tmp_path):
         archive.writestr("room/a.bin", b"a")
     with pytest.raises(OSError, match="No space"):
         taken(tmp_path, full)
+
+
+@pytest.mark.parametrize("files", ["x", [], 3, {"a": "b"}, None])
+def test_receipts_that_nobody_wrote(tmp_path, files):
+    _records.of_downloads(tmp_path)
+    receipt = tmp_path / "set" / "room" / "download.json"
+    assert is_there(_records.LISTED, _records.DATA, tmp_path)
+    receipt.write_text(json.dumps({"files": files}))
+    assert "download.json" in refused(is_there, _records.LISTED, _records.DATA, tmp_path)
+    receipt.write_text("[]")
+    assert "download.json" in refused(is_there, _records.LISTED, _records.DATA, tmp_path)
+
+
+CATALOGUES = [
+    ("bytes = 5", 'bytes = "5"'),
+    ("bytes = 5", "bytes = 1" + "0" * 400),
+    ("bytes = 5", "bytes = nan"),
+    ("bytes = 5", "about_gb = {}"),
+    ('folder = "room"', 'folder = "../room"'),
+    ('folder = "room"', "folder = 3"),
+    ('also = ["a"]', "also = [1]"),
+    ('name = "CC"', "name = 1"),
+    ('title = "A"', "title = []"),
+]
+
+
+@pytest.mark.parametrize(("line", "other"), CATALOGUES)
+def test_catalogues_with_values_of_other_kinds(tmp_path, monkeypatch, line, other):
+    text = """[set]
+title = "A"
+home = ""
+citation = ""
+source = ""
+[set.licence]
+name = "CC"
+address = ""
+says = ""
+[set.scenes.room]
+address = "https://example.org/a.zip"
+bytes = 5
+folder = "room"
+also = ["a"]
+"""
+    file = tmp_path / "catalogue.toml"
+    monkeypatch.setenv(catalogue.VARIABLE, str(file))
+    file.write_text(text)
+    assert catalogue._read.__wrapped__(str(file))["set"].size == "0.00 MB"
+    assert line in text
+    file.write_text(text.replace(line, other))
+    assert "catalogue.toml" in refused(catalogue._read.__wrapped__, str(file))
+
+
+@pytest.mark.parametrize("width", [0, -3, 10**400, 2**62])
+def test_widths_that_no_picture_has(tmp_path, width):
+    scene = _scenes.room(tmp_path)
+    assert "width" in refused(load_images, scene.train, np.array([0]), width)
 
 
 FIGURES = [
