@@ -25,6 +25,9 @@ def npz(path: Path) -> "dict[str, np.ndarray]":
 
     try:
         with np.load(path, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
+            found = {name: stored[name] for name in stored.files}
+            if not all(isinstance(array, np.ndarray) for array in found.values()):
+                raise ValueError("it has something else than arrays")
+            return found
     except DAMAGED as error:
         raise ValueError(f"'{path}' is damaged: {error}") from None

@@ -97,10 +97,10 @@ def unsealed(record: dict[str, Any], what: str) -> dict[str, Any]:
         raise UserError(f"{what} is no JSON object; make it again")
     bare = {key: value for key, value in record.items() if key != SEAL}
     try:
-        as_made = SEAL not in record or record[SEAL] == content_sha256(bare)
-    except (ValueError, RecursionError):  # NaN, or lists in lists in lists: never ours
-        as_made = False
-    if not as_made:
+        found = content_sha256(bare)
+    except (ValueError, RecursionError):
+        raise UserError(f"{what} has NaN, infinity, or lists too deep; make it again") from None
+    if record.get(SEAL, found) != found:
         raise UserError(f"{what} was edited since it was made; make it again")
     return bare
 

@@ -8,11 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ..common import (
-    bounded,
-    extras,  # no source: it says what to install
-    limits,
-)
+from ..common import bounded, limits
+from ..common import extras  # no source: it says what to install
 from ..common.errors import UserError
 from ._quiet import hush_pillow, silenced
 

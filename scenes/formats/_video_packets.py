@@ -16,11 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ...common import (
-    bounded,
-    extras,  # no source: it says what to install
-    limits,
-)
+from ...common import bounded, limits
+from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError
 
 # The containers of the endings in `video.SUFFIXES`. By its content FFmpeg would open anything under these names, such as
