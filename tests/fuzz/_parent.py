@@ -15,7 +15,7 @@ from unittest import mock
 from tests.fuzz._reader import Input, Reader, changes, lay_out
 from tests.fuzz._worker import Board, Finding, mind_warnings, save, valid_capture, work
 
-LIMIT_S = 10.0  # of CPU for one input; or so many times that by the clock, since machines are busy
+LIMIT_S = 20.0  # of CPU for one input, which is read up to five times; or so many times that by the clock
 WAITS = 12
 SHORT = Path("/dev/shm") if Path("/dev/shm").is_dir() else Path(tempfile.gettempdir())
 

@@ -425,7 +425,7 @@ def of_caches(root: Path) -> None:
     from tests.scenes.test_video import encode, scenery
     from viewbench.scenes.formats import _video_cache, video
 
-    encode(root / "walk.mp4", scenery(4, 32, 48))
+    encode(root / "walk.mp4", scenery(4))
     with _cache(root / "cache"):
         video.read(root / "walk.mp4", cache_gb=1)
         for file in _video_cache._held.values():
