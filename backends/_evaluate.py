@@ -39,7 +39,8 @@ def evaluate(
     different (another hold-out may have trained on what is scored now), or the scene has no test split.
     """
     train = read_json(model / "train.json", "training record")
-    if not isinstance(train, dict) or not isinstance(train.get("files"), dict):
+    kinds = {"files": dict, "backend": str, "width": int}
+    if not isinstance(train, dict) or not all(isinstance(train.get(key), kind) for key, kind in kinds.items()):
         raise UserError(f"'{model / 'train.json'}' is not what training writes; train again")
     train = unsealed(train, f"'{model / 'train.json'}'")
     if not len(scene.test):

@@ -158,7 +158,7 @@ def of_points(root: Path) -> None:
     }
     for name, way in ways.items():
         PlyData([vertex], **way).write(root / f"{name}.ply")
-        PlyData([PlyElement.describe(faces, "face"), vertex], **way).write(root / f"{name}_faces.ply")
+        PlyData([vertex, PlyElement.describe(faces, "face")], **way).write(root / f"{name}_faces.ply")
         PlyData([vertex, PlyElement.describe(lists, "face")], **way).write(root / f"{name}_lists.ply")
     doubles = table.astype([("x", "f8"), ("y", "f8"), ("z", "f8"), ("nx", "f8"), *base[4:]])
     PlyData([PlyElement.describe(doubles, "vertex")], comments=["made up"]).write(root / "doubles.ply")
