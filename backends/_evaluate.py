@@ -16,6 +16,7 @@ from ..common.files import finite_or_none, read_json, sealed, sha256_file, unsea
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
+from ..scenes.image_files import leaves
 from ..scenes.images import Picture, read_images
 from ..scenes.pictures import picture_name, save_png, to_uint8
 from ..scenes.types import Scene
@@ -125,9 +126,17 @@ def check_model(model: Path, train: dict[str, Any], scene: Scene, scene_hash: st
 
 
 def altered_file(model: Path, train: dict[str, Any]) -> str | None:
-    """Name of the first file of the model that is missing or not as `train` says; None where all are well."""
+    """Name of the first file of the model that is missing or not as `train` says; None where all are well.
+
+    One that lies outside the folder, by its name or through a link, is none of the model's.
+    """
     for name, sha256 in train["files"].items():
-        if not (model / name).is_file() or sha256_file(model / name) != sha256:
+        if (
+            leaves(name)
+            or (model / name).is_symlink()
+            or not (model / name).is_file()
+            or sha256_file(model / name) != sha256
+        ):
             return name
     return None
 

@@ -152,6 +152,8 @@ def _obeyed(backend: str, capabilities: Any, budget: Budget) -> None:
 def _work_folder(out: Path, asked: dict[str, Any], resumes: bool) -> Path:
     """The folder that a run fills. One left behind by a killed run is kept when the same is asked of it again."""
     work = out / WORK
+    if work.is_symlink() or (work / "model").is_symlink():  # none of ours: it would lead what is written elsewhere
+        raise UserError(f"'{work}' leads through a link; remove it, or name another folder")
     asked_file = work / "asked.json"
     text = json.dumps(asked, sort_keys=True)
     same = asked_file.is_file() and asked_file.read_text(encoding="utf-8") == text
@@ -185,7 +187,8 @@ def _replace_model(model: Path, out: Path) -> None:
     shutil.rmtree(out / "renders", ignore_errors=True)
     names = sorted(file.name for file in model.iterdir())
     before = read_json(out / LEFT, "list of files") if (out / LEFT).is_file() else []
-    for name in {*names, *(name for name in before if isinstance(name, str) and Path(name).name == name)}:
+    mine = (name for name in before if isinstance(name, str) and name != ".." and Path(name).name == name)
+    for name in {*names, *mine}:
         target = out / name
         if target.is_dir() and not target.is_symlink():
             shutil.rmtree(target)

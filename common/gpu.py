@@ -104,16 +104,17 @@ def _lock(uuid: str) -> int | None:
         return -1
     folder = Path(tempfile.gettempdir()) / FOLDER
     with contextlib.suppress(OSError):
-        folder.mkdir(exist_ok=True)
-        folder.chmod(0o1777)
+        folder.mkdir()
+        folder.chmod(0o1777)  # by whoever made it: another user's may be a link to a folder of ours by now
     path = folder / uuid.replace("/", "_")
     with contextlib.suppress(OSError):
-        os.close(os.open(path, os.O_CREAT | os.O_EXCL, 0o666))
-        path.chmod(0o666)
+        made = os.open(path, os.O_CREAT | os.O_EXCL, 0o666)
+        os.fchmod(made, 0o666)
+        os.close(made)
     try:
-        file = os.open(path, os.O_RDWR)
-    except OSError:
-        file = os.open(path, os.O_RDONLY)  # of another user; NFS wants more, a local file system does not
+        file = _opened(path)
+    except OSError:  # a link, or nothing that can be made
+        return -1
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -123,6 +124,15 @@ def _lock(uuid: str) -> int | None:
         os.close(file)
         return -1
     return file
+
+
+def _opened(path: Path) -> int:
+    """A descriptor of a lock's file. Raises OSError for a link, which another user may have left to any file."""
+    careful = os.O_NOFOLLOW | os.O_NONBLOCK
+    try:
+        return os.open(path, os.O_RDWR | careful)
+    except OSError:
+        return os.open(path, os.O_RDONLY | careful)  # of another user; NFS wants more, a local file system does not
 
 
 def _identities() -> dict[str, str]:

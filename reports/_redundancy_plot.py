@@ -1,13 +1,14 @@
 """A picture of redundancy: the uncovered distance over the number of views, still or to be hovered over (.html)."""
 
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 
 import numpy as np
 
 from ..common.files import whole
 from ..selectors._redundancy import Level
-from ._selection_plot import kind_of
+from ._selection_plot import kind_of, plain
 from ._style import FIXED
 
 COLOUR = FIXED["maxmin"].colour
@@ -53,7 +54,7 @@ def _still(path: Path, title: str, curve: np.ndarray, n: int, levels: Sequence[L
                 color=GREY,
                 fontsize=8,
             )
-        axes.set_title(title)
+        axes.set_title(plain(title))
         axes.set_xlabel(X)
         axes.set_ylabel(Y)
         axes.set_xlim(0, len(curve) * 1.02)
@@ -97,7 +98,7 @@ def _interactive(path: Path, title: str, curve: np.ndarray, n: int, levels: Sequ
             ),
         ]
     )
-    figure.update_layout(title=title, showlegend=False, template="plotly_white")
+    figure.update_layout(title=escape(title), showlegend=False, template="plotly_white")
     figure.update_xaxes(title=X)
     figure.update_yaxes(title=Y, type="log", dtick="D1")
     figure.write_html(path, include_plotlyjs=True, default_height="95vh")

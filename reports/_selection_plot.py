@@ -3,13 +3,14 @@
 Without poses there is no path, and what is drawn is the strip along the capture alone.
 """
 
+from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..common import extras
-from ..common.errors import UserError, nearest
+from ..common.errors import UserError, nearest, printable
 from ..common.files import whole
 from ._picked import Picked
 from ._strip import CHOSEN, GREY, Y, draw_strip, strip_traces
@@ -37,6 +38,11 @@ def kind_of(path: Path) -> str:
     return kind
 
 
+def plain(text: str) -> str:
+    """The text as matplotlib shows it letter by letter: between two $ it would read formulas, and fail at bad ones."""
+    return printable(text).replace("$", r"\$")
+
+
 def _arrow(positions: np.ndarray) -> float:
     """Length of a viewing direction: a share of the extent that stays readable from 10 to 1,000 chosen views."""
     return 0.04 * float(np.ptp(positions, axis=0).max() or 1.0)
@@ -55,7 +61,7 @@ def _still(path: Path, picked: Picked) -> None:
         if picked.posed:
             _from_above(places[0], picked)
         draw_strip(places[-1], picked)
-        places[0].set_title(picked.title)
+        places[0].set_title(plain(picked.title))
         if not picked.posed:
             by = "" if picked.distance is None else f", compared by {picked.factors}"
             words = f"{len(picked.chosen):,} chosen of {len(picked.frames):,} frames{by}"
@@ -95,6 +101,7 @@ def _interactive(path: Path, picked: Picked) -> None:
     import plotly.graph_objects as go
     from plotly.subplots import make_subplots
 
+    # Here and below: plotly takes texts for HTML, and a name may have links in it.
     if picked.posed:
         kinds = [[{"type": "scene"}], [{"type": "xy"}]]
         figure = make_subplots(rows=2, cols=1, specs=kinds, row_heights=[0.8, 0.2], vertical_spacing=0.04)
@@ -107,7 +114,7 @@ def _interactive(path: Path, picked: Picked) -> None:
         figure = go.Figure(strip_traces(picked))
     figure.update_xaxes(title=picked.unit)
     figure.update_yaxes(title=Y.replace("\n", "<br>"), visible=picked.distance is not None)
-    figure.update_layout(title=picked.title, template="plotly_white", margin={"l": 60, "r": 10, "b": 40})
+    figure.update_layout(title=escape(picked.title), template="plotly_white", margin={"l": 60, "r": 10, "b": 40})
     figure.write_html(path, include_plotlyjs=True, default_height="95vh")
 
 
@@ -118,7 +125,9 @@ def _path(picked: Picked) -> list[Any]:
     positions = cameras.positions
     tips = positions[chosen] + _arrow(positions) * cameras.forward[chosen]
     rays = np.stack([positions[chosen], tips, np.full_like(tips, np.nan)], axis=1).reshape(-1, 3)
-    order = [f"chosen as number {rank + 1}, frame {index} ({names[index]})" for rank, index in enumerate(chosen)]
+    order = [
+        f"chosen as number {rank + 1}, frame {index} ({escape(names[index])})" for rank, index in enumerate(chosen)
+    ]
     grey, orange = {"color": GREY, "size": 2}, {"color": CHOSEN, "size": 4}
     return [
         go.Scatter3d(**_xyz(positions), mode="lines+markers", marker=grey, line={"color": GREY}, name="all frames"),

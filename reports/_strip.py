@@ -1,5 +1,6 @@
 """A choice along the capture: when frames were chosen, and how far each frame is from the nearest chosen one."""
 
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,8 @@ def strip_traces(picked: Picked) -> list[Any]:
     """The same for plotly, with the frame's name, its distance and the chosen frame that it is nearest to."""
     import plotly.graph_objects as go
 
-    names, clock = picked.frames.names, picked.clock
+    # Plotly takes texts for HTML, and a name may have links in it.
+    names, clock = [escape(name) for name in picked.frames.names], picked.clock
     ranks = {int(index): rank for rank, index in enumerate(picked.chosen, start=1)}
     traces: list[Any] = []
     if picked.distance is not None:

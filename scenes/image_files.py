@@ -9,13 +9,17 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from ..common import bounded, limits
-from ..common import extras  # no source: it says what to install
 from ..common.errors import UserError
 from ._quiet import hush_pillow, silenced
 
+# Of PNG, JPEG, TIFF, BMP, GIF, WebP, JPEG 2000, PNM and PFM, .npy, OpenEXR and Radiance; HEIC and AVIF have "ftyp".
+BEGINNINGS = (
+    *(b"\x89PNG", b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"BM", b"GIF8", b"RIFF", b"\0\0\0\x0cjP"),
+    *(b"\xff\x4f\xff\x51", *(b"P%d" % kind for kind in range(1, 8)), b"PF", b"Pf", b"\x93NUMPY", b"v/1\x01", b"#?"),
+)
 HEIC = {".heic", ".heif", ".hif"}  # as iPhones and some cameras write them; PIL reads them with pillow-heif
 # Those that are opened, whatever the file is called. PIL knows forty more; for one of them, EPS, it runs Ghostscript.
-FORMATS = ("JPEG", "PNG", "BMP", "GIF", "PPM", "TIFF", "WEBP", "JPEG2000")  # MPO is opened as JPEG
+FORMATS = ("JPEG", "PNG", "BMP", "GIF", "PPM", "TIFF", "WEBP", "JPEG2000")
 
 
 def is_file(path: Path) -> bool:
@@ -50,6 +54,8 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
     formats = FORMATS
 
     if path.suffix.lower() in HEIC:
+        from ..common import extras  # no source: it says what to install
+
         extras.need("pillow_heif")
         import pillow_heif  # pyright: ignore[reportMissingImports]: an extra
 
@@ -110,6 +116,21 @@ def check_whole(path: Path) -> None:
         # An eighth of the size is enough to go through all of a JPEG's data, in half the time.
         image.draft(None, (max(1, image.width // 8), max(1, image.height // 8)))
         image.load()
+
+
+def check_picture(path: Path) -> None:
+    """Raises UserError for a file that does not begin as a picture, a mask or a depth image does.
+
+    What goes into a subset may be a link of the capture to anything: to a key, say, that would be copied.
+    """
+    try:
+        bounded.checked(path)
+        with open(path, "rb") as file:
+            head = file.read(16)
+    except OSError as error:
+        raise UserError(f"image '{path}' cannot be read: {error.strerror}") from None
+    if not head.startswith(BEGINNINGS) and head[4:8] != b"ftyp":
+        raise UserError(f"'{path}' is no picture and no depth image; take it out of the capture")
 
 
 def leaves(name: str) -> bool:

@@ -57,6 +57,8 @@ def read_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[I
     full = split.cameras[indices]
     cameras = full if width is None else full.scaled(width)
     sizes = set(zip(cameras.width.tolist(), cameras.height.tolist(), strict=True))
+    if any(not 0 < w * h <= limits.PIXELS for w, h in sizes):
+        raise UserError(f"pictures of {max(sizes)[0]} x {max(sizes)[1]} are too large; give a smaller --width")
     if len(sizes) > 1:
         raise UserError(f"frames have different sizes, {sorted(sizes)}; resize the images of the capture to one")
     return _read_all([split.paths[index] for index in indices], full, cameras), pinholes(cameras)

@@ -25,6 +25,8 @@ def files(root: Path) -> tuple[Path, ...]:
 def write(root: Path, encoder: str, made_by: dict[str, Any], pictures: Sequence[str], rows: np.ndarray) -> Path:
     """Writes (N, D) rows of the N pictures, named by their SHA-256, as float16. Returns the .npy file."""
     folder = root / FOLDER
+    if folder.is_symlink():
+        raise UserError(f"'{folder}' is a link, and may lead anywhere; remove it")
     folder.mkdir(exist_ok=True)
     file = folder / f"{encoder}.npy"
     with whole(file) as temporary, open(temporary, "wb") as opened:

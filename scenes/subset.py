@@ -11,7 +11,7 @@ import numpy as np
 from ..common import plugins
 from ..common.errors import UserError
 from ..common.files import sealed, whole_folder, write_json
-from .image_files import check_whole, is_file
+from .image_files import check_picture, check_whole, is_file
 from .types import UNCALIBRATED, Scene
 
 LINKS = ("absolute", "relative", "copy")  # how images come into a subset
@@ -89,10 +89,22 @@ def check_target(scene: Scene, out: Path, format_name: str, force: bool) -> None
         )
     if lens not in ("", UNCALIBRATED) and format_name != scene.format:
         raise UserError(f"scene '{scene.name}' has {lens} cameras, which only its own format tells; undistort it first")
+    _check_way(out, scene)
     if out.exists() and _holds(out, scene):  # said before anybody is told of --force
         raise UserError(f"'{out}' holds the capture itself, or files of it; name another folder")
     if out.exists() and (not out.is_dir() or any(out.iterdir())) and not force:
         raise UserError(f"'{out}' exists and is not empty; name another folder or give --force")
+
+
+def _check_way(out: Path, scene: Scene) -> None:
+    """Raises UserError where `out` lies in the capture and leads out of it by a link there: whoever made the capture
+    would choose the folder that is written, and by --force replaced."""
+    root, at = scene.root.resolve(), out.absolute()
+    steps = [at, *at.parents]
+    below = next((i for i, step in enumerate(steps) if step.resolve() == root), 0)
+    link = next((step for step in steps[:below] if step.is_symlink()), None)
+    if link is not None:
+        raise UserError(f"'{out}' leads through '{link}', a link in the capture; name a folder elsewhere")
 
 
 def _holds(out: Path, scene: Scene) -> bool:
@@ -126,6 +138,7 @@ def place_image(source: Path, target: Path, copy: bool) -> None:
     """
     if not is_file(source):
         raise UserError(f"image '{source}' is missing")
+    check_picture(source)
     target.parent.mkdir(parents=True, exist_ok=True)
     if target.exists():
         if filecmp.cmp(source, target, shallow=False):

@@ -1,6 +1,7 @@
 """Study files: a grid scenes × selectors × ratios × seeds × backends, checked before anything runs."""
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 from ..backends import _registry
 from ..backends._train import all_options
 from ..backends._types import SHARED
-from ..common import catalogue, plugins
+from ..common import bounded, catalogue, limits, plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import Settings
 from ..selectors._run import all_parameters
@@ -146,17 +147,35 @@ def load(study: str, settings: Settings) -> Study:
 
     path = Path(study) if study.endswith((".yaml", ".yml")) else STUDIES / f"{study}.yaml"
     try:
-        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
+        bounded.checked(path)
+        raw = yaml.safe_load(bounded.data(path, "study", limits.STUDY_BYTES).decode("utf-8"))
     except OSError:
         known = names()
         raise UserError(f"unknown study '{study}'{nearest(study, known)} (there are: {', '.join(known)})") from None
     except (yaml.YAMLError, ValueError, ArithmeticError, AttributeError, RecursionError) as error:
         raise UserError(f"study '{path}' is not valid YAML: {error}") from None
+    if _nodes(raw, {}) > limits.STUDY_NODES:
+        raise UserError(f"study '{path}' has more than {limits.STUDY_NODES:,} values when its aliases are written out")
     schema = json.loads((FOLDER / "schemas" / "study.schema.json").read_text(encoding="utf-8"))
     errors = list(jsonschema.Draft202012Validator(schema).iter_errors(raw))
     if errors:
         raise UserError(f"study '{path}': {_explain(errors[0], schema)}")
     return _complete(raw, path, settings)
+
+
+def _nodes(value: Any, known: dict[int, float]) -> float:
+    """How many values a tree of lists and mappings has, one that stands in several places counted in each of them.
+
+    Infinity for one that is part of itself.
+    """
+    if not isinstance(value, (dict, list)):
+        return 1
+    if id(value) not in known:
+        known[id(value)] = math.inf  # until it is counted
+        known[id(value)] = 1 + sum(
+            _nodes(part, known) for part in (value.values() if isinstance(value, dict) else value)
+        )
+    return known[id(value)]
 
 
 def _row(backend: str, scene: str, selector: str, ratio: float, seed: int) -> dict[str, str]:

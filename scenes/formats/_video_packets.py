@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 
 from ...common import bounded, limits
-from ...common import extras  # no source: it says what to install
 from ...common.errors import UserError
 
-# The containers of the endings in `video.SUFFIXES`. By its content FFmpeg would open anything under these names, such as
-# lists of other files and addresses (HLS, concat).
+# The containers of the endings in `video.SUFFIXES`. By its content FFmpeg would open anything under these names, lists
+# of other files and addresses (HLS, concat) too.
 OPENING = {"format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts", "protocol_whitelist": "file"}
 KEY, SPARE, HIDDEN = 1, 2, 4  # bits of `flags`: decoding can start here; no other frame needs it; not shown
 
@@ -65,6 +64,8 @@ def opened(root: Path) -> Iterator[tuple[Any, Any]]:
 
     Raises UserError, from the body's decoding too, for a file that is no video or has none in it.
     """
+    from ...common import extras  # no source: it says what to install
+
     extras.need("av")
     import av
     from av.error import FFmpegError

@@ -4,12 +4,13 @@ import difflib
 import os
 import signal
 import sys
+import warnings
 
 import click
 
 from ... import __version__
-from ...common import extras, plugins
-from ...common.errors import UserError
+from ...common import extras, plugins, terminal
+from ...common.errors import UserError, printable
 
 PACKAGE = "workflow.commands"
 
@@ -45,6 +46,14 @@ def group() -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Runs one command and returns the exit status: 0 or the command's, 2 for a user's mistake, 130 when stopped."""
     signal.signal(signal.SIGTERM, _stop)  # so that temporary files are removed on the way out
+    if not sys.warnoptions:  # of libraries, about what a file holds: what matters of it is said in a sentence
+        for kind in (RuntimeWarning, UserWarning):
+            warnings.simplefilter("ignore", kind)
+    with terminal.guarded():
+        return _run(arguments)
+
+
+def _run(arguments: list[str] | None) -> int:
     try:
         status = group.main(arguments, prog_name="viewbench", standalone_mode=False)
         sys.stdout.flush()
@@ -63,6 +72,9 @@ def run(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except UnicodeEncodeError as error:
+        name = str(error.object)[max(0, error.start - 40) : error.end + 40]
+        return _fail(f"a name is no text that can be written: '{printable(name)}'; rename the file")
     except OSError as error:
         if error.errno is None:
             raise
@@ -71,7 +83,7 @@ def run(arguments: list[str] | None = None) -> int:
 
 
 def _fail(message: str) -> int:
-    print(f"viewbench: {message}", file=sys.stderr)
+    print(f"viewbench: {printable(message)}", file=sys.stderr)
     return 2
 
 

@@ -1,6 +1,7 @@
 """Options that several commands share, and the way they show progress."""
 
 import functools
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...common.errors import UserError
+from ...common.errors import UserError, printable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -89,10 +90,26 @@ class Capture:
             "progress": progress("frames"),
             "extract": pictures,
         }
+        self._check_settings(settings)
         scene = open_scene(self.name, settings, **options)
         for note in scene.notes if notes else ():
-            print(f"viewbench: {scene.name}: {note}", file=sys.stderr)
+            print(printable(f"viewbench: {scene.name}: {note}"), file=sys.stderr)
         return scene
+
+    def _check_settings(self, settings: "Settings") -> None:
+        """Raises UserError where the settings of the current folder are part of the capture: whoever made that could
+        name programs in them that are run, and folders that are written to."""
+        from ...common.settings import FILE
+
+        folder = Path(self.name)
+        if str(settings.source) != FILE or not os.path.exists(self.name):  # noqa: PTH110: of any text
+            return
+        folder = (folder if folder.is_dir() else folder.parent).resolve()
+        if Path.cwd().resolve().is_relative_to(folder):
+            raise UserError(
+                f"'{FILE}' in the current folder lies in the capture and may have come with it; call viewbench from "
+                f"another folder, or set VIEWBENCH_ENVIRONMENT={FILE} if it is yours"
+            )
 
 
 SCENE = (

@@ -14,6 +14,7 @@ from . import _options
 def command(scene: _options.Capture, as_json: bool) -> None:
     """Say what was detected in SCENE, a folder or a name of environment.toml."""
     from ...common import settings as settings_file
+    from ...common.errors import printable
     from ...common.files import plain
     from ...scenes.summary import summary
 
@@ -25,4 +26,4 @@ def command(scene: _options.Capture, as_json: bool) -> None:
         return
     for name, value in facts.items():
         shown = ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else value
-        click.echo(f"{name.replace('_', ' '):<20}{'none' if value in (None, [], ()) else shown}")
+        click.echo(f"{name.replace('_', ' '):<20}{'none' if value in (None, [], ()) else printable(str(shown))}")
