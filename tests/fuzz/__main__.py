@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from tests.fuzz import _parent, readers
+from tests.fuzz._reader import Reader
 from tests.fuzz._replay import replay
 from viewbench.common.files import whole
 
@@ -19,7 +20,7 @@ def main() -> int:
     parser.add_argument("--inputs", type=int, default=100_000, help="of each reader")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0, help="number of the first input")
-    parser.add_argument("--round", type=int, default=5000, help="inputs before the next reader's turn")
+    parser.add_argument("--round", type=int, default=2000, help="inputs before the next reader's turn")
     parser.add_argument("--out", type=Path, default=Path("build/fuzz"), help="reproductions, and table.csv")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--replay", type=Path, metavar="FILE", help="try one reproduction again")
@@ -36,25 +37,30 @@ def main() -> int:
         parser.error(f"no reader is called {unknown[0]} (there are: {', '.join(known)})")
     names = given.readers or list(known)
     given.out.mkdir(parents=True, exist_ok=True)
-    tallies = run([known[name] for name in names], given)
-    return int(any(tally.findings for tally in tallies))
+    done = run([known[name] for name in names], given)
+    return int(any(runner.broken or runner.tally.findings for runner in done))
 
 
-def run(chosen, given) -> list[_parent.Tally]:
-    """Tallies in the order of the readers; the table is written after every turn."""
+def run(chosen: list[Reader], given: argparse.Namespace) -> list[_parent.Runner]:
+    """What came of the readers, in their order; the table is written after every turn."""
     out = given.out.resolve()
     runners = [_parent.Runner(reader, given.seed, out, given.jobs) for reader in chosen]
     try:
         for first in range(given.first, given.first + given.inputs, given.round):
-            for runner in runners:
-                tally = runner.run(first, min(given.round, given.first + given.inputs - first))
+            for runner in [runner for runner in runners if not runner.broken]:
+                try:
+                    tally = runner.run(first, min(given.round, given.first + given.inputs - first))
+                except RuntimeError as error:  # of the harness: the other readers go on
+                    runner.broken = str(error)
+                    print(f"{runner.reader.name}: {error}", file=sys.stderr, flush=True)
+                    continue
                 print("  ".join(tally.row()), flush=True)
                 with whole(out / "table.csv") as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
                     csv.writer(file).writerows([COLUMNS, *(one.tally.row() for one in runners)])
     finally:
         for runner in runners:
             runner.__exit__()
-    return [runner.tally for runner in runners]
+    return runners
 
 
 if __name__ == "__main__":

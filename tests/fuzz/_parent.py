@@ -58,7 +58,7 @@ class Runner:
     def __init__(self, reader: Reader, seed: int, out: Path, jobs: int):
         self.reader, self.seed, self.out, self.jobs = reader, seed, out, jobs
         self.home = Path(tempfile.mkdtemp(prefix=f"viewbench-fuzz-{reader.name}-", dir=SHORT))
-        self.tally = Tally(reader.name)
+        self.tally, self.broken = Tally(reader.name), ""
         mind_warnings()
         try:
             self.valid = valid_capture(reader, self.home / "made")
