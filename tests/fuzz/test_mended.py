@@ -356,6 +356,34 @@ def test_widths_that_no_picture_has(tmp_path, width):
     assert "width" in refused(load_images, scene.train, np.array([0]), width)
 
 
+@pytest.mark.parametrize("value", [1e308, float("inf"), float("nan"), 10**400, "x", None])
+def test_models_to_be_drawn_with_numbers_that_are_none(tmp_path, value):
+    pytest.importorskip("numba")
+    from viewbench.backends import splat
+
+    _records.of_model(tmp_path)
+    scene, _ = _records.small_scene()
+    file = tmp_path / "model" / "splat.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "near": value}))
+    assert "splat.json" in refused(splat.render, tmp_path / "model", scene.test.cameras)
+
+
+@pytest.mark.parametrize(("key", "value"), [("backend", 3), ("width", {}), ("width", None), ("files", [])])
+def test_records_of_models_of_other_kinds(tmp_path, key, value):
+    pytest.importorskip("numba")
+    from viewbench.backends._evaluate import evaluate
+
+    _records.of_model(tmp_path)
+    scene, _ = _records.small_scene()
+    file = tmp_path / "model" / "train.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), key: value}))
+
+    def scored():
+        evaluate(tmp_path / "model", scene, tmp_path / "out", settings=_scenes.SETTINGS)
+
+    assert "train.json" in refused(scored)
+
+
 FIGURES = [
     ("metrics.json", "psnr_db", "x"),
     ("metrics.json", "seconds", None),
