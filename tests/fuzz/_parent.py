@@ -98,8 +98,9 @@ class Runner:
                 running = [alive for one in running if (alive := self._watched(one))]
         finally:
             for one in running:
-                os.kill(one.pid, signal.SIGKILL)
-                os.waitpid(one.pid, 0)
+                with contextlib.suppress(ProcessLookupError, ChildProcessError):  # one that has ended
+                    os.kill(one.pid, signal.SIGKILL)
+                    os.waitpid(one.pid, 0)
         for board in boards:
             _, _, opened, refused, spent, most = board.read()
             self.tally.opened += opened
