@@ -81,6 +81,8 @@ def _listed(file: Path, table: dict, frames: Split) -> tuple[Split, Split, Split
     listed: dict[str, set[int]] = {}
     for key in ("train", "test", "val"):
         names = table.get(f"{key}_filenames") or []
+        if not isinstance(names, list):
+            raise UserError(f"'{file}': {key}_filenames is no list of names")
         unknown = [name for name in names if not isinstance(name, str) or name not in index]
         if unknown:
             raise UserError(f"'{file}': {key}_filenames names {unknown[0]!r}, which no frame has")

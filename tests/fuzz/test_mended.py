@@ -32,6 +32,7 @@ from viewbench.scenes.images import load_images
 from viewbench.scenes.load import open_scene
 from viewbench.scenes.seen import FILE, shares_of
 from viewbench.scenes.splits import held_out
+from viewbench.scenes.subset import write_scene
 from viewbench.scenes.validate import check_present, check_scene
 from viewbench.selectors._selection import load_selection
 from viewbench.workflow import _study
@@ -92,6 +93,24 @@ def test_times_of_a_phone_that_are_none(tmp_path, time):
     table["frame_000000"]["timestamp"] = time
     file.write_text(json.dumps(table))
     assert open_scene(str(tmp_path), _scenes.SETTINGS).train.times is None
+
+
+@pytest.mark.parametrize("names", [3.5, "a", {"a": 1}, True])
+def test_lists_of_transforms_that_are_none(tmp_path, names):
+    _scenes.of_nerfstudio(tmp_path / "in")
+    file = tmp_path / "in" / "room" / "transforms.json"
+    table = json.loads(file.read_text())
+    file.write_text(json.dumps({**table, "train_filenames": [table["frames"][0]["file_path"]], "val_filenames": names}))
+    assert "val_filenames" in refused(open_scene, str(tmp_path / "in" / "room"), _scenes.SETTINGS)
+
+
+def test_a_subset_of_transforms_with_nan_in_a_field_of_their_own(tmp_path):
+    _scenes.room(tmp_path / "room")
+    file = tmp_path / "room" / "transforms_train.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "mine": float("nan")}))
+    scene = open_scene(str(tmp_path / "room"), _scenes.SETTINGS)
+    assert "NaN" in refused(write_scene, scene, np.arange(2), tmp_path / "out", "transforms")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_transform_between_cameras_that_has_no_inverse(tmp_path):
