@@ -156,7 +156,7 @@ def _typed(made: T) -> T:
             raise ValueError(f"'{name}' of {type(made).__name__} is no number of bytes or GB")
         if kind in (str, bool) and not isinstance(value, kind):
             raise ValueError(f"'{name}' of {type(made).__name__} is no {'text' if kind is str else 'true or false'}")
-        if kind == tuple[str, ...] and not all(isinstance(one, str) for one in value):
+        if isinstance(value, tuple) and not all(isinstance(one, str) for one in value):
             raise ValueError(f"'{name}' of {type(made).__name__} is no list of texts")
     return made
 

@@ -30,7 +30,7 @@ def _check_split(scene: Scene, split: Split) -> None:
     if bad.any():
         raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' has NaN or infinite entries")
     if split.times is not None and not np.isfinite(split.times).all():
-        late = _first(split, ~np.isfinite(split.times))
+        late = split.names[int(np.isfinite(split.times).argmin())]
         raise UserError(f"scene '{scene.name}': the time of frame '{late}' is NaN or infinite")
     with np.errstate(all="ignore"):  # huge numbers in a damaged file overflow, and are found so
         gram = cameras.rotations.transpose(0, 2, 1) @ cameras.rotations
@@ -40,8 +40,8 @@ def _check_split(scene: Scene, split: Split) -> None:
     if bad.any():
         raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' is no rigid motion")
     if cameras.distortion is not None and not np.isfinite(cameras.distortion).all():
-        bad = ~np.isfinite(cameras.distortion).all(axis=1)
-        raise UserError(f"scene '{scene.name}': the lens of frame '{_first(split, bad)}' has NaN or infinite numbers")
+        first = split.names[int(np.isfinite(cameras.distortion).all(axis=1).argmin())]
+        raise UserError(f"scene '{scene.name}': the lens of frame '{first}' has NaN or infinite numbers")
     sizes = np.stack([cameras.fx, cameras.fy, cameras.width, cameras.height])
     bad = ~((sizes > 0) & np.isfinite(sizes)).all(axis=0) | ~np.isfinite(cameras.cx + cameras.cy)
     if bad.any():

@@ -46,10 +46,9 @@ def facts(file: Path) -> dict[str, Any] | None:
     record = _read(file)
     if not isinstance(record, dict) or not isinstance(record.get("hdr"), str):
         return None
-    size, turn = record.get("size"), record.get("turn")
-    if not _whole(size, 2) or not _whole(turn, 4) or min(size) < 1 or not set(turn) <= {-1, 0, 1}:
-        return None
-    return record if max(size) < 1 << 31 else None
+    size, turn = record.get("size") or [], record.get("turn") or []
+    sound = _whole(size, 2) and _whole(turn, 4) and 1 <= min(size) <= max(size) < 1 << 31 and set(turn) <= {-1, 0, 1}
+    return record if sound else None
 
 
 def lost(file: Path) -> set[int]:

@@ -15,7 +15,7 @@ from unittest import mock
 from tests.fuzz._reader import Input, Reader, changes, lay_out
 from tests.fuzz._worker import Board, Finding, mind_warnings, save, valid_capture, work
 
-LIMIT_S = 20.0  # of CPU for one input, which is read up to five times; or so many times that by the clock
+LIMIT_S = 20.0  # of CPU for one input, which is read up to five times; or waiting for so many times that
 WAITS = 12
 SHORT = Path("/dev/shm") if Path("/dev/shm").is_dir() else Path(tempfile.gettempdir())
 
@@ -159,7 +159,9 @@ class Runner:
         trace = (one.home / "trace").read_text(errors="replace")[-3000:]
         said = (one.home / "said").read_text(errors="replace")[-1000:]
         rows = [row.strip() for row in trace.split("\n") if "File" in row]
-        ours = next((row for row in rows if not any(part in row for part in ("/tests/", "/lib/python"))), "?")
+        ours = next(
+            (row for row in rows if not any(part in row for part in ("/tests/", "/lib/python", "<frozen"))), "?"
+        )
         kind = "hang" if one.killed else f"died of {name}"
         change = changes(self.reader, self.valid, self.seed, number)
         save(self.out, self.reader, number, self.seed, Finding(kind, ours, f"{trace}\n{said}"), change)
@@ -171,7 +173,17 @@ def _stuck(one: _Running, number: int, began: float) -> bool:
     if number != one.seen:
         one.seen, one.cpu_s = number, _cpu_s(one.pid)
         return False
-    return _cpu_s(one.pid) - one.cpu_s > LIMIT_S or time.time() - began > WAITS * LIMIT_S
+    if _cpu_s(one.pid) - one.cpu_s > LIMIT_S:
+        return True
+    return time.time() - began > WAITS * LIMIT_S and _state(one.pid) == "S"  # it waits, not for its turn of the CPU
+
+
+def _state(pid: int) -> str:
+    """What the process does: "R" where it runs or could, "S" where it waits for something."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return ""
 
 
 def _cpu_s(pid: int) -> float:

@@ -90,7 +90,7 @@ def opens_settings(given: Input) -> None:
     settings = settings_file.load(given.root / given.changed[0])
     for name, entry in settings.scenes.items():
         settings.folder_of(entry)
-        settings.dataset_of(name, "x"), settings.room_of(name), settings.walk_of(name)
+        _ = settings.dataset_of(name, "x"), settings.room_of(name), settings.walk_of(name)
     if settings.compute.threads < 1 or settings.features.batch < 1 or settings.data.video_cache_gb < 1:
         raise InvalidError("numbers that mean nothing")
 

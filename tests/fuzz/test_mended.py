@@ -113,6 +113,27 @@ def test_a_subset_of_transforms_with_nan_in_a_field_of_their_own(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_names_longer_than_a_file_system_takes(tmp_path):
+    _scenes.of_scannetpp("iphone", tmp_path / "phone")
+    file = tmp_path / "phone" / "iphone" / "pose_intrinsic_imu.json"
+    table = json.loads(file.read_text())
+    file.write_text(json.dumps({**table, "a" * 300: table["frame_000000"]}))
+    assert "a" * 300 not in open_scene(str(tmp_path / "phone"), _scenes.SETTINGS).train.names
+    _scenes.of_rgbd("tum-rgbd", tmp_path)
+    (tmp_path / "room0" / "depth.txt").write_text(f"100.0 depth/{'a' * 300}.png\n100.1 depth/1.png\n")
+    depths = open_scene(str(tmp_path / "room0"), _scenes.SETTINGS).train.depths
+    assert [path is not None for path in depths] == [False, True, False]
+
+
+def test_keypoints_of_points_that_the_model_does_not_have(tmp_path):
+    _scenes.of_rig("txt", tmp_path)
+    points = tmp_path / "model" / "sparse" / "0" / "points3D.txt"
+    rows = points.read_text().split("\n")
+    points.write_text("\n".join(row for i, row in enumerate(rows) if i != 5))
+    scene = open_scene(str(tmp_path / "model"), _scenes.SETTINGS)
+    assert "damaged" in refused(write_scene, scene, np.array([0, 2]), tmp_path / "out", "colmap")
+
+
 def test_a_transform_between_cameras_that_has_no_inverse(tmp_path):
     _scenes.of_seven(tmp_path)
     matrix = np.eye(4)
@@ -183,7 +204,7 @@ def test_libtiff_does_not_write_to_stderr(tmp_path, capfd):
     _files.pixels("1").save(tmp_path / "fax.tif", compression="group4")
     data = bytearray((tmp_path / "fax.tif").read_bytes())
     with Image.open(tmp_path / "fax.tif") as image:
-        at = image.tag_v2[273][0]
+        at = vars(image)["tag_v2"][273][0]
     data[at : at + 8] = b"\xff" * 8
     (tmp_path / "fax.tif").write_bytes(data)
     with contextlib.suppress(UserError):
