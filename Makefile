@@ -11,7 +11,7 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server test-slurm soak hostile
+.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server test-slurm soak hostile fuzz
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
@@ -24,6 +24,7 @@ help:
 	@echo "make size        seconds to 25 dB by size of the pictures, memory by number of views (10 minutes)"
 	@echo "make memory      peak memory of choosing, training and scoring by number of frames, up to 3,000 (10 minutes)"
 	@echo "make hostile     captures that mean harm: what each costs in seconds and memory (3 minutes)"
+	@echo "make fuzz        100,000 damaged inputs for every reader (FUZZ='--inputs 1000 kitti' for a part of it)"
 	@echo "make external    a trainer from PyPI, nerfstudio's, installed (4 GB), run on the CPU and checked"
 	@echo "make test-server a study logged to MLflow's server over PostgreSQL while both are killed (10 minutes; INSTALL=1: apt-get)"
 	@echo "make test-slurm  a study on a cluster of Slurm's, made and harmed here (root; INSTALL=1 installs Slurm; 20 minutes)"
@@ -105,6 +106,10 @@ size: dev
 
 memory: dev
 	$(THREADS) $(BIN)/python tests/bench/bench_memory.py $(BENCH)
+
+# Reproductions and a table in build/fuzz.
+fuzz: dev
+	$(THREADS) $(BIN)/python -m tests.fuzz $(FUZZ)
 
 # A program that is not ours behind `command:`; its environment is kept in build/external.
 external: dev

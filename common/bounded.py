@@ -7,7 +7,7 @@ import stat
 from pathlib import Path
 from typing import Any
 
-from . import limits
+from . import arrays, limits
 from .errors import UserError
 
 LINKED_LEVELS = 4  # of folders above a file: captures are that deep
@@ -69,6 +69,17 @@ def array(path: str | os.PathLike) -> Any:
     import numpy as np
 
     size = checked(path, limits.FEATURE_BYTES)
+    try:
+        _check_head(path, size)
+        return np.load(path, allow_pickle=False)
+    except arrays.DAMAGED as error:
+        raise ValueError(f"it is damaged: {error}") from None
+
+
+def _check_head(path: str | os.PathLike, size: int) -> None:
+    """Raises ValueError, and more as the head is damaged, where it claims more numbers than the file has."""
+    import numpy as np
+
     with open(path, "rb") as file:
         heads = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
         version = np.lib.format.read_magic(file)
@@ -77,7 +88,6 @@ def array(path: str | os.PathLike) -> Any:
         shape, _, kind = heads[version](file)
         if kind.hasobject or file.tell() + math.prod(shape) * kind.itemsize > size:
             raise ValueError("its head claims more than numbers that are in it")
-    return np.load(path, allow_pickle=False)
 
 
 def linked(path: Path) -> bool:

@@ -6,11 +6,13 @@ import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, get_type_hints
 
 from .errors import UserError, nearest
 
 FILE = Path(__file__).resolve().parent.parent / "scenes" / "catalogue.toml"
+T = TypeVar("T")
+LARGEST = 1e18  # bytes
 VARIABLE = "VIEWBENCH_CATALOGUE"  # names another file than the one that ships
 
 
@@ -122,26 +124,41 @@ def _read(path: str) -> dict[str, DataSet]:
         raw = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise UserError(f"catalogue '{path}' cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise UserError(f"catalogue '{path}' is not valid TOML: {error}") from None
     try:
         return {name: _dataset(name, dict(values)) for name, values in raw.items()}
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
+    except (TypeError, ValueError, KeyError, AttributeError, OverflowError) as error:
         raise UserError(f"catalogue '{path}' is not as its head says: {error}") from None
 
 
 def _dataset(name: str, values: dict[str, Any]) -> DataSet:
-    archives = {key: Archive(**given) for key, given in values.pop("archives", {}).items()}
+    archives = {key: _typed(Archive(**given)) for key, given in values.pop("archives", {}).items()}
     used = [given.get("archive") for given in values.get("scenes", {}).values()]
     scenes = {}
     for scene, given in values.pop("scenes", {}).items():
         given = dict(given)
         key, address = given.pop("archive", None), given.pop("address", "")
-        archive = archives[key] if key else Archive(address) if address else None
+        archive = archives[key] if key else _typed(Archive(address)) if address else None
         given |= {"also": tuple(given.get("also", ())), "shared": used.count(key) if key else 1}
-        scenes[scene] = Listed(name, scene, given.pop("folder", scene), archive, **given)
-    licence = Licence(**values.pop("licence"))
-    return DataSet(name=name, licence=licence, scenes=scenes, **{"group": name, **values})
+        scenes[scene] = _typed(Listed(name, scene, given.pop("folder", scene), archive, **given))
+        if any(part in ("", "..") for part in scenes[scene].path.split("/")):
+            raise ValueError(f"scene '{scene}' lies outside the folder of its data set")
+    licence = _typed(Licence(**values.pop("licence")))
+    return _typed(DataSet(name=name, licence=licence, scenes=scenes, **{"group": name, **values}))
+
+
+def _typed(made: T) -> T:
+    """The object, if its texts are texts and its numbers numbers. Raises ValueError that names one which is not."""
+    for name, kind in get_type_hints(type(made)).items():
+        value = getattr(made, name)
+        if kind in (int, float) and not (type(value) in (int, float) and 0 <= value < LARGEST):
+            raise ValueError(f"'{name}' of {type(made).__name__} is no number of bytes or GB")
+        if kind in (str, bool) and not isinstance(value, kind):
+            raise ValueError(f"'{name}' of {type(made).__name__} is no {'text' if kind is str else 'true or false'}")
+        if isinstance(value, tuple) and not all(isinstance(one, str) for one in value):
+            raise ValueError(f"'{name}' of {type(made).__name__} is no list of texts")
+    return made
 
 
 def names() -> list[str]:

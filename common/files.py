@@ -99,8 +99,14 @@ def unsealed(record: dict[str, Any], what: str) -> dict[str, Any]:
 
     Raises UserError, which calls the record `what`, when its content is not what was sealed.
     """
+    if not isinstance(record, dict):
+        raise UserError(f"{what} is no JSON object; make it again")
     bare = {key: value for key, value in record.items() if key != SEAL}
-    if SEAL in record and record[SEAL] != content_sha256(bare):
+    try:
+        found = content_sha256(bare)
+    except (ValueError, RecursionError):
+        raise UserError(f"{what} has NaN, infinity, or lists too deep; make it again") from None
+    if record.get(SEAL, found) != found:
         raise UserError(f"{what} was edited since it was made; make it again")
     return bare
 

@@ -195,7 +195,7 @@ def load(path: str | os.PathLike | None = None) -> Settings:
         raw = tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:
         raise UserError(f"settings '{source}' cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits is a ValueError of its own
         raise UserError(f"settings '{source}' is not valid TOML: {error}") from None
     _known(raw, [*SECTIONS, *TABLES], str(source), "section")
     for section in raw:

@@ -136,7 +136,8 @@ def _tracking_words(folder: Path) -> str:
     stamps = [path for name in ("tracked", "tracked.partial") if (path := folder / f"{name}.json").is_file()]
     if not stamps:
         return ""
-    skipped = read_json(max(stamps, key=lambda path: path.stat().st_mtime_ns), "stamp of tracking").get("skipped", "")
+    record = read_json(max(stamps, key=lambda path: path.stat().st_mtime_ns), "stamp of tracking")
+    skipped = record.get("skipped", "") if isinstance(record, dict) else ""
     return f"not logged: {skipped}" if skipped else ""
 
 

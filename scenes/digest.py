@@ -4,8 +4,10 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import time
 from pathlib import Path
+from typing import Any
 
 from ..common import bounded, limits
 from ..common.errors import UserError
@@ -14,6 +16,7 @@ from .types import Scene
 
 REMEMBERED_BYTES = 1 << 26  # the hashes of larger scenes are kept: reading gigabytes again for every step takes hours
 KEPT_S = 90 * 86400.0  # and so long: hashes of scenes that nobody has opened since go
+SHA256 = re.compile("[0-9a-f]{64}")
 MISSING = "missing"  # in place of the hash of a file that is not there
 SETTLED_S = 2.0  # a file changed less than that ago may change again without a new time
 
@@ -97,6 +100,11 @@ def _state(path: Path) -> list[int]:
 def _remembered(file: Path) -> dict[str, list]:
     try:
         known = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
-    return known if isinstance(known, dict) else {}
+    return {name: entry for name, entry in known.items() if _is_entry(entry)} if isinstance(known, dict) else {}
+
+
+def _is_entry(entry: Any) -> bool:
+    """Whether it is a state and a hash; a damaged cache says nothing."""
+    return isinstance(entry, list) and bool(entry) and isinstance(entry[-1], str) and bool(SHA256.fullmatch(entry[-1]))

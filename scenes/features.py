@@ -5,7 +5,6 @@ what its features depend on besides the pictures, `encoder(argument, device)` lo
 """
 
 import hashlib
-import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -173,7 +172,10 @@ def picture(path: Path, size: int) -> np.ndarray:
 def cached(file: Path) -> np.ndarray | None:
     """The row in the cache, or None where there is none or it is damaged."""
     try:
-        content = file.read_bytes()
-        return None if altered(content) else np.load(io.BytesIO(content), allow_pickle=False)
-    except (OSError, ValueError, EOFError):
+        row: Any = bounded.array(file)
+        if altered(file.read_bytes()):
+            return None
+    except (OSError, ValueError):
         return None
+    whole_row = isinstance(row, np.ndarray) and row.ndim == 1 and row.dtype == np.float32 and np.isfinite(row).all()
+    return row if whole_row else None

@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import os
 import struct
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
@@ -9,6 +10,7 @@ from typing import Any
 
 from ..common import bounded, limits
 from ..common.errors import UserError
+from ._quiet import hush_pillow, silenced
 
 # Of PNG, JPEG, TIFF, BMP, GIF, WebP, JPEG 2000, PNM and PFM, .npy, OpenEXR and Radiance; HEIC and AVIF have "ftyp".
 BEGINNINGS = (
@@ -48,6 +50,7 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
     from PIL import Image
 
     _bounded_pillow()
+    hush_pillow()
     formats = FORMATS
 
     if path.suffix.lower() in HEIC:
@@ -65,7 +68,8 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
         with Image.open(path, formats=formats) as image:
             if not head and image.format in ("JPEG", "MPO") and "progressive" in image.info:
                 _check_scans(path)
-            yield image
+            with silenced(image.format == "TIFF"):
+                yield image
     except FileNotFoundError:
         raise UserError(f"image '{path}' is missing") from None
     except Image.DecompressionBombError:
@@ -78,6 +82,18 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
     except (OSError, SyntaxError, ValueError, KeyError, EOFError, struct.error) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise UserError(f"image '{path}' cannot be read: {reason}") from None
+    except Exception as error:
+        if not _of_pillow(error):
+            raise
+        raise UserError(f"image '{path}' cannot be read: it is damaged ({error})") from None
+
+
+def _of_pillow(error: Exception) -> bool:
+    """Whether it was raised in PIL's own code, which a damaged file makes stumble in any way."""
+    at = error.__traceback__
+    while at is not None and at.tb_next is not None:
+        at = at.tb_next
+    return at is not None and f"{os.sep}PIL{os.sep}" in at.tb_frame.f_code.co_filename
 
 
 def _check_scans(path: Path) -> None:

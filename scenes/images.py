@@ -30,7 +30,11 @@ def load_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[n
     See `read_images`.
     """
     read, cameras = read_images(split, indices, width)
-    images = np.empty((len(cameras), int(cameras.height[0]), int(cameras.width[0]), 3), np.float32)
+    shape = (len(cameras), int(cameras.height[0]), int(cameras.width[0]), 3)
+    try:
+        images = np.empty(shape, np.float32)
+    except MemoryError:
+        raise UserError(f"{shape[0]} pictures of {shape[2]} x {shape[1]} need more memory than there is") from None
     for image, picture in zip(images, read, strict=True):
         image[:] = picture.pixels()
     return images, cameras
@@ -47,6 +51,8 @@ def read_images(split: Split, indices: np.ndarray, width: int | None) -> tuple[I
         raise UserError("the cameras' intrinsics are not known; give --intrinsics fx,fy,cx,cy or write a camera.txt")
     if split.lens:
         raise UserError(f"cameras are {split.lens}, not pinholes; undistort the capture (colmap image_undistorter)")
+    if width is not None and not 1 <= width <= limits.SIDE:
+        raise UserError(f"width {str(width)[:40]} must be in [1, {limits.SIDE}]: it is the pixels that a picture has")
     indices = np.asarray(indices, dtype=np.int64)
     full = split.cameras[indices]
     cameras = full if width is None else full.scaled(width)
@@ -62,7 +68,10 @@ def _read_all(paths: list[Path], full: Cameras, cameras: Cameras) -> Iterator[Pi
     lens, where = b"", np.zeros(0)
     for path, before, camera in zip(paths, full, cameras, strict=True):
         size = (int(camera.width[0]), int(camera.height[0]))
-        picture = _shrunk(_read(path, (int(before.width[0]), int(before.height[0]))), size)
+        try:
+            picture = _shrunk(_read(path, (int(before.width[0]), int(before.height[0]))), size)
+        except MemoryError:
+            raise UserError(f"image '{path}' needs more memory than there is; resize the images") from None
         if camera.distortion is not None:
             # Most captures have one camera, and finding where its lens looks takes as long as the rest.
             same = b"".join(value.tobytes() for name, value in vars(camera).items() if name != "c2w")

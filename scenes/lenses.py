@@ -21,6 +21,7 @@ STEP = 1 / 1024  # of the factor: one that every machine rounds alike
 LARGEST = 4.0  # more is no lens but a damaged file
 
 
+@np.errstate(all="ignore")  # a damaged file's numbers overflow, and are found so
 def zoom(camera: Cameras) -> float:
     """The least factor, from 1 to 4, of the focal lengths of the pinhole that sees nothing beyond the camera's picture.
 

@@ -5,6 +5,8 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..common import plugins
 from ..common.errors import UserError, nearest
 from ..common.settings import SceneEntry, Settings
@@ -38,7 +40,8 @@ def open_scene(
     root = _folder(name_or_path, entry, settings)
     asked = format or (entry.format if entry else "")
     chosen, options = reader_of(root, asked, entry, reading, settings, detect)
-    scene = plugins.load(FORMATS, chosen).read(root, **options)
+    with np.errstate(all="ignore"):  # what a damaged file makes overflow is found afterwards
+        scene = plugins.load(FORMATS, chosen).read(root, **options)
     files = (*scene.files, *shipped_features.files(root))  # a choice is made by them
     scene = dataclasses.replace(scene, name=name_or_path if entry else root.resolve().name, files=files)
     scene = _held_out(scene, holdout or "", entry.holdout if entry else "", settings)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..common.errors import UserError
 from ..common.files import read_json
 
 FILE = "seen_test.json"  # of a capture; `viewbench render` writes it
@@ -20,4 +21,6 @@ def shares_of(root: Path, names: Sequence[str]) -> list[float] | None:
     shares = record.get("seen") if isinstance(record, dict) else None
     if not isinstance(shares, dict) or not all(isinstance(shares.get(name), float | int) for name in names):
         return None
-    return [shares[name] for name in names]
+    if not all(0 <= shares[name] <= 1 for name in names):
+        raise UserError(f"shares '{file}' has one that is not in [0, 1]; delete the file")
+    return [float(shares[name]) for name in names]

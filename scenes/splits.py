@@ -20,7 +20,7 @@ def held_out(rule: str, n: int) -> np.ndarray:
     no test view but those at a run's ends has a training neighbour in time. `none` takes nothing.
     Raises UserError for another rule, or one that would leave fewer than two training views.
     """
-    match = re.fullmatch(r"(every|blocks):(\d+)|none", rule)
+    match = re.fullmatch(r"(every|blocks):(\d{1,9})|none", rule)
     if not match or (match[1] and int(match[2]) < 2):
         raise UserError(f"unknown holdout rule '{rule}'; it is every:K or blocks:K with K of at least 2, or none")
     if not match[1]:

@@ -29,6 +29,9 @@ def _check_split(scene: Scene, split: Split) -> None:
     bad = ~np.all(np.isfinite(cameras.c2w), axis=(1, 2))
     if bad.any():
         raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' has NaN or infinite entries")
+    if split.times is not None and not np.isfinite(split.times).all():
+        late = split.names[int(np.isfinite(split.times).argmin())]
+        raise UserError(f"scene '{scene.name}': the time of frame '{late}' is NaN or infinite")
     with np.errstate(all="ignore"):  # huge numbers in a damaged file overflow, and are found so
         gram = cameras.rotations.transpose(0, 2, 1) @ cameras.rotations
         bad = ~(np.abs(gram - np.eye(3)).max(axis=(1, 2), initial=0) <= RIGID)
@@ -36,6 +39,9 @@ def _check_split(scene: Scene, split: Split) -> None:
     bad |= np.abs(cameras.c2w[:, 3] - [0, 0, 0, 1]).max(axis=1, initial=0) > RIGID
     if bad.any():
         raise UserError(f"scene '{scene.name}': the pose of frame '{_first(split, bad)}' is no rigid motion")
+    if cameras.distortion is not None and not np.isfinite(cameras.distortion).all():
+        first = split.names[int(np.isfinite(cameras.distortion).all(axis=1).argmin())]
+        raise UserError(f"scene '{scene.name}': the lens of frame '{first}' has NaN or infinite numbers")
     sizes = np.stack([cameras.fx, cameras.fy, cameras.width, cameras.height])
     bad = ~((sizes > 0) & np.isfinite(sizes)).all(axis=0) | ~np.isfinite(cameras.cx + cameras.cy)
     if bad.any():

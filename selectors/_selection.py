@@ -1,6 +1,7 @@
 """`selection.json`: how many views, the hash of the choice, and the first K views of a greedy order."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,26 @@ from ..scenes.types import Scene
 CHOICE = ("scene", "scene_sha256", "holdout", "selector", "parameters", "seed", "n_views", "count", "indices", "names")
 
 COUNTS = ("round", "floor")  # how a ratio becomes a number of views: ours, and the `int` of the paper's authors
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _all(value: Any, fits: Callable[[Any], bool]) -> bool:
+    return isinstance(value, list) and all(map(fits, value))
+
+
+# What the parts of a selection are that other code counts on, where they are there.
+FORM: dict[str, Callable[[Any], bool]] = {
+    "names": lambda value: _all(value, lambda name: isinstance(name, str)),
+    "gains": lambda value: value is None or _all(value, lambda gain: gain is None or _is_number(gain)),
+    "notes": lambda value: (
+        value is None or (isinstance(value, dict) and _is_number(value.get("below_precision_from", 0)))
+    ),
+    "cut_from": _is_number,
+    "seconds": lambda value: isinstance(value, dict) and all(map(_is_number, value.values())),
+}
 
 
 def count_of(ratio: float, n: int, rule: str = "round") -> int:
@@ -41,6 +62,9 @@ def load_selection(path: Path) -> dict[str, Any]:
     selection = read_json(path, "selection")
     if not isinstance(selection, dict) or not isinstance(selection.get("indices"), list):
         raise UserError(f"'{path}' is no selection; make one with `viewbench select`")
+    odd = next((key for key, fits in FORM.items() if key in selection and not fits(selection[key])), None)
+    if odd is not None:
+        raise UserError(f"selection '{path}' has a {odd} that is none; make it with `viewbench select`")
     return unsealed(selection, f"selection '{path}'")
 
 

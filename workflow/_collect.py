@@ -41,6 +41,21 @@ COLUMNS = (
     "status",
 )
 
+NUMBER, MAYBE = (int, float), (int, float, type(None))
+# What is taken from each record, and its types.
+FIGURES: dict[str, dict[str, Any]] = {
+    "selection.json": {"n_views": int, "count": int, "seconds": dict},
+    "train.json": {
+        "seconds": NUMBER,
+        "iterations": (int, type(None)),
+        "peak_rss_bytes": MAYBE,
+        "peak_gpu_bytes": MAYBE,
+        "commit": (str, type(None)),
+        "selection_sha256": str,
+    },
+    "metrics.json": {"psnr_db": MAYBE, "ssim": MAYBE, "lpips": MAYBE, "seconds": NUMBER},
+}
+
 
 def collect(study: Study, results: Path, settings: Settings, partial: bool = False) -> list[dict[str, Any]]:
     """Writes and returns the rows, in the order of the grid.
@@ -87,6 +102,7 @@ def _figures(cell: dict[str, str], folder: Path, asked: Asked) -> dict[str, Any]
     metrics = read_json(folder / "metrics.json", "metrics")
     asked.check(cell, folder, selection, train, metrics)
     scene = asked.scene(cell["scene"])
+    _complete(folder, {"selection.json": selection, "train.json": train, "metrics.json": metrics})
     values = {
         "dataset": scene.dataset,
         "n_views": selection["n_views"],
@@ -106,6 +122,20 @@ def _figures(cell: dict[str, str], folder: Path, asked: Asked) -> dict[str, Any]
         "viewbench": train.get("viewbench", __version__),
     }
     return {key: "" if value is None else value for key, value in values.items()}
+
+
+def _complete(folder: Path, records: dict[str, dict[str, Any]]) -> None:
+    """Raises UserError where a record lacks a figure of the row, or has something else in its place."""
+    for file, keys in FIGURES.items():
+        for key, kinds in keys.items():
+            value = records[file].get(key, ...)
+            numbers = value.values() if isinstance(value, dict) else [value]
+            fits = isinstance(value, kinds) and not any(isinstance(one, bool) for one in numbers)
+            if not fits or (kinds is dict and not all(isinstance(one, int | float) for one in numbers)):
+                raise UserError(
+                    f"cell '{folder}': {file} has no {key}, or one that is none; delete {file} there and run the study "
+                    "again"
+                )
 
 
 def _logs(results: Path, cell: dict[str, str]) -> dict[Path, str]:

@@ -98,16 +98,16 @@ class Asked:
         """Raises UserError, which names the file to delete, where one was made from something else."""
         selector, backend = self.study.selector(cell["selector"]), self.study.backend(cell["backend"])
         found = {"selection.json": selection, "train.json": train, "metrics.json": metrics}
-        expected = {
-            "selection.json": self._selection(cell, selector),
-            "train.json": self._train(cell, backend, selection),
-            "metrics.json": self._metrics(cell, backend, folder),
-        }
         for file, record in found.items():
             try:
                 unsealed(record, file)
             except UserError as error:
                 raise UserError(f"cell '{folder}': {error}; delete {file} there and run the study again") from None
+        expected = {
+            "selection.json": self._selection(cell, selector),
+            "train.json": self._train(cell, backend, selection),
+            "metrics.json": self._metrics(cell, backend, folder),
+        }
         for file, values in expected.items():
             for key, value in values.items():
                 if found[file].get(key) != value:

@@ -159,7 +159,7 @@ def load(study: str, settings: Settings) -> Study:
         raise UserError(f"unknown study '{study}'{nearest(study, known)} (there are: {', '.join(known)})") from None
     except OSError as error:
         raise UserError(f"study '{path}' cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError, ArithmeticError, AttributeError, RecursionError) as error:
         raise UserError(f"study '{path}' is not valid YAML: {error}") from None
     if _nodes(raw, {}) > limits.STUDY_NODES:
         raise UserError(f"study '{path}' has more than {limits.STUDY_NODES:,} values when its aliases are written out")

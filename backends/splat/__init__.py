@@ -13,6 +13,7 @@ from ...scenes.types import Cameras
 from .._types import Budget, Capabilities, Report, Trained, TrainingSet
 from .options import Options, Rendering, defaults
 
+HUGE = 1e30  # of what is drawn with: float32 holds no more
 CAPABILITIES = Capabilities(device="cpu", resumes=True, default_iterations=3000, options=defaults())
 
 
@@ -50,7 +51,9 @@ def render(model: Path, cameras: Cameras) -> Iterator[np.ndarray]:
     settings = read_json(model / "splat.json", "splat settings")
     try:
         rendering = Rendering(**{name: kind(settings[name]) for name, kind in Rendering.__annotations__.items()})
-    except (KeyError, TypeError, ValueError):
+        if not all(abs(float(value)) < HUGE for value in vars(rendering).values()):
+            raise ValueError
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise UserError(f"'{model / 'splat.json'}' is not what training wrote; train again") from None
     return draw(ply.read(model / "model.ply"), cameras, rendering)
 

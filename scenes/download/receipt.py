@@ -24,7 +24,7 @@ def is_there(scene: Listed, data: DataSet, root: Path) -> bool:
     if not folder.exists():
         return False
     if (folder / RECEIPT).is_file():
-        files = read_json(folder / RECEIPT, "receipt").get("files", {})
+        files = _files(folder / RECEIPT)
         wrong = [name for name, size in files.items() if _size(folder / name) != size]
         if wrong:
             raise UserError(
@@ -63,9 +63,18 @@ def publish(scene: Listed, data: DataSet, staging: Path, folder: Path, made_from
         print(f"viewbench: what was in '{folder}' is in '{kept}'", file=sys.stderr)
 
 
+def _files(receipt: Path) -> dict[str, int]:
+    """Bytes of each file that the receipt lists. Raises UserError for one that viewbench did not write."""
+    record = read_json(receipt, "receipt")
+    files = record.get("files", {}) if isinstance(record, dict) else None
+    if not isinstance(files, dict) or not all(isinstance(size, int) for size in files.values()):
+        raise UserError(f"receipt '{receipt}' is not as viewbench writes it; --force fetches the scene again")
+    return files
+
+
 def _move_added(old: Path, folder: Path) -> None:
     """Moves files that the receipt of the old folder does not list, and that the new one does not have."""
-    listed = {*read_json(old / RECEIPT, "receipt").get("files", {}), RECEIPT}
+    listed = {*_files(old / RECEIPT), RECEIPT}
     for path in [path for path in old.rglob("*") if path.is_symlink() or path.is_file()]:
         name = path.relative_to(old).as_posix()
         if name not in listed and not (folder / name).exists():

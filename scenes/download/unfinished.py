@@ -2,12 +2,18 @@
 
 import contextlib
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from ...common.errors import UserError
 from ...common.files import read_json, write_json
+
+FORM: dict[str, Callable[[Any], bool]] = {
+    "force": lambda value: isinstance(value, bool),
+    "directory": lambda value: isinstance(value, str),
+    "unpacked": lambda value: isinstance(value, list) and all(isinstance(one, str) for one in value),
+}
 
 
 @contextlib.contextmanager
@@ -35,7 +41,11 @@ class State:
         record = {}
         with contextlib.suppress(UserError):
             record = read_json(path) if path.is_file() else {}
-        self.record: dict[str, Any] = record if isinstance(record, dict) else {}
+        known = record if isinstance(record, dict) else {}
+        # What is damaged is as if it were not there: at the worst something comes once more.
+        self.record: dict[str, Any] = {
+            key: known[key] for key, fits in FORM.items() if key in known and fits(known[key])
+        }
 
     @property
     def directory(self) -> str | None:

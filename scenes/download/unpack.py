@@ -1,9 +1,12 @@
 """Takes a scene's files out of an archive: none leaves the folder, and what is there and right is not read again."""
 
 import contextlib
+import errno
 import gzip
 import itertools
+import lzma
 import stat
+import struct
 import tarfile
 import zipfile
 import zlib
@@ -20,6 +23,16 @@ from .room import check_room
 LEFT_OUT = ("__MACOSX", ".DS_Store", "Thumbs.db")  # what systems leave in archives
 ENCRYPTED = 1  # bit of a zip member's flags
 DEEPEST = 3  # archives within archives
+
+
+# What zipfile, tarfile and the decoders raise for bytes that are none of theirs.
+DAMAGED = (
+    *(zipfile.BadZipFile, tarfile.TarError, zlib.error, lzma.LZMAError, struct.error),
+    *(EOFError, RuntimeError, ValueError, IndexError, KeyError, OverflowError),
+)
+
+
+OF_CONTENT = (None, errno.EINVAL, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG)
 
 
 class DamagedError(UserError):
@@ -139,9 +152,17 @@ def damaged(name: str, member: str = "") -> Iterator[None]:
         yield
     except NotImplementedError as error:
         raise DamagedError(f"archive '{name}' is packed in a way that Python does not know: {error}") from None
-    except (zipfile.BadZipFile, tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError, RuntimeError) as error:
+    except (*DAMAGED, OSError) as error:
+        if isinstance(error, OSError) and not _of_content(error):
+            raise
         where = f" at '{member}'" if member else ""
         raise DamagedError(f"archive '{name}' is damaged{where}: {error}") from None
+
+
+def _of_content(error: OSError) -> bool:
+    """Whether it is about what is in the archive: bz2 says so without a number, a seek to nowhere with EINVAL; and
+    names that are a file's and a folder's, or that no file system takes."""
+    return isinstance(error, gzip.BadGzipFile) or error.errno in OF_CONTENT
 
 
 def extract_tar(path: Path, prefix: str, also: tuple[str, ...], folder: Path, name: str, done: Done) -> None:

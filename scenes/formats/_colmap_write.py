@@ -165,6 +165,14 @@ def _write_model(
     return True
 
 
+def _deregister(model: Any, frame_id: int, source: Path) -> None:
+    """Raises UserError where keypoints name points that the model does not have: a damaged one is found out here."""
+    try:
+        model.deregister_frame(frame_id)
+    except (IndexError, KeyError, RuntimeError, ValueError) as error:
+        raise UserError(f"COLMAP model '{source}' is damaged: {str(error).splitlines()[0]}") from None
+
+
 def _reduced(source: Path, wanted: Sequence[str], points: Points | None) -> Any:
     """The model with these images alone, and with all of `points`: those whose tracks are gone have none."""
     import pycolmap
@@ -175,7 +183,7 @@ def _reduced(source: Path, wanted: Sequence[str], points: Points | None) -> Any:
         model = _without_rigs(model, kept)  # a frame goes or stays with all of its cameras
     for image in list(model.images.values()):
         if image.name not in kept and image.has_pose:
-            model.deregister_frame(image.frame_id)
+            _deregister(model, image.frame_id, source)
     missing: dict[tuple, int] = {}  # how many points lie in one place with one colour
     for key in _keys(points):
         missing[key] = missing.get(key, 0) + 1

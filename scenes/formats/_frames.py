@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,17 @@ def natural(name: str) -> list[tuple[int, int, str]]:
             f"frame '{name[:40]}…' has a name of {len(name):,} letters, at most {limits.NAME_LETTERS:,} are read"
         )
     return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", name)]
+
+
+def times_of(values: Sequence[Any]) -> np.ndarray | None:
+    """(N,) seconds, or None unless every frame has a finite one."""
+    if not values or not all(isinstance(value, (int, float)) for value in values):
+        return None
+    try:
+        times = np.array(values, dtype=np.float64)
+    except OverflowError:
+        return None
+    return times if np.isfinite(times).all() else None
 
 
 def by_number(folder: Path, suffixes: Sequence[str]) -> list[Path]:

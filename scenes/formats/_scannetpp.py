@@ -8,11 +8,11 @@ import numpy as np
 
 from ...common.errors import UserError
 from ...common.files import read_json
-from ..image_files import leaves
+from ..image_files import is_file, leaves
 from ..splits import LEAST_TRACK
 from ..types import Points, Scene, Split
 from . import colmap
-from ._frames import natural, split
+from ._frames import natural, split, times_of
 from ._intrinsics import Intrinsics
 
 PHONE = "pose_intrinsic_imu.json"
@@ -33,7 +33,7 @@ def there(folder: Path | None, name: Any) -> Path | None:
     """The file of that name in the folder, or None."""
     if folder is None or not isinstance(name, str) or leaves(name):
         return None
-    return folder / name if (folder / name).is_file() else None
+    return folder / name if is_file(folder / name) else None
 
 
 def points(folder: Path, train: Split) -> tuple[Points | None, tuple[Path, ...], list[str]]:
@@ -71,7 +71,7 @@ def phone(root: Path, folder: Path) -> Scene:
     if not isinstance(table, dict) or not all(isinstance(frame, dict) for frame in table.values()):
         raise UserError(f"'{file}' should have an object with a frame under each name")
     every = sorted(table, key=natural)
-    names = [name for name in every if not leaves(name) and (folder / "rgb" / f"{name}.jpg").is_file()]
+    names = [name for name in every if not leaves(name) and is_file(folder / "rgb" / f"{name}.jpg")]
     if not names:
         raise UserError(f"'{folder / 'rgb'}' has no pictures; extract them by iphone/prepare_iphone_data.py")
     paths = [folder / "rgb" / f"{name}.jpg" for name in names]
@@ -86,8 +86,7 @@ def phone(root: Path, folder: Path) -> Scene:
     made = split(root, paths, poses, first, depths=depths)
     cameras = replace(made.cameras, fx=k[:, 0, 0], fy=k[:, 1, 1], cx=k[:, 0, 2], cy=k[:, 1, 2])
     masks = tuple(there(folder / "rgb_masks", f"{name}.png") for name in names)
-    times = [row.get("timestamp") for row in rows]
-    stamps = np.array(times, np.float64) if all(isinstance(time, (int, float)) for time in times) else None
+    stamps = times_of([row.get("timestamp") for row in rows])
     train = replace(made, cameras=cameras, times=stamps, masks=masks if any(masks) else ())
     dropped = len(every) - len(names)
     return Scene(

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...common.errors import UserError
 from ...common.files import write_json
 from ..companions import smaller
 from ..image_files import is_file, leaves, stored_name
@@ -51,7 +52,7 @@ def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> list[str]
         number += len(split)
     if own and names["train"] != SINGLE:
         for key, listed in frames.items():
-            write_json(out / names[key], {**head, **(own.get(key, {}) if key != "train" else {}), "frames": listed})
+            _write(out / names[key], {**head, **(own.get(key, {}) if key != "train" else {}), "frames": listed})
         return []
     every = [frame for listed in frames.values() for frame in listed]
     notes = [*([] if own else _without_bent_depths(every, splits)), *_without_gaps(every)]
@@ -59,10 +60,21 @@ def write(scene: Scene, indices: np.ndarray, out: Path, copy: bool) -> list[str]
     lists = {key: [frame["file_path"] for frame in listed] for key, listed in frames.items()}
     held = lists["test"] or lists["train"][::EVALUATED]
     lists = {"train_filenames": lists["train"], "val_filenames": lists.get("spare") or held, "test_filenames": held}
-    write_json(out / SINGLE, {**head, **lists, "frames": every})
+    _write(out / SINGLE, {**head, **lists, "frames": every})
     if own and not (scene.root / BLENDER).is_dir():
         return notes
     return [*notes, *_blender(frames, splits, head, out, copy)]
+
+
+def _write(file: Path, table: dict[str, Any]) -> None:
+    """Writes a file of transforms. Raises UserError for NaN in what is copied from the capture: JSON has none."""
+    try:
+        write_json(file, table)
+    except (ValueError, RecursionError):
+        raise UserError(
+            f"the capture's transforms have NaN, infinity or lists too deep in a field that '{file.name}' would copy; "
+            "take it out"
+        ) from None
 
 
 def _frames(
@@ -176,7 +188,7 @@ def _blender(
             else:
                 target.symlink_to(Path("..", "..", stored))
             listed.append({"file_path": place, "transform_matrix": frame["transform_matrix"]})
-        write_json(out / file, {"camera_angle_x": head["camera_angle_x"], "frames": listed})
+        _write(out / file, {"camera_angle_x": head["camera_angle_x"], "frames": listed})
     return []
 
 

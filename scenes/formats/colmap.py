@@ -171,7 +171,10 @@ def _registered(model: Path) -> tuple[Any, list[Any]]:
 
 def _split(reconstruction: Any, images: Sequence[Any], folder: Path, beside: Path) -> Split:
     """Frames of these images, whose pictures are in `folder`, and masks and depth images in folders of `beside`."""
-    world_to_camera = np.stack([image.cam_from_world().matrix() for image in images])
+    try:
+        world_to_camera = np.stack([image.cam_from_world().matrix() for image in images])
+    except (RuntimeError, ValueError, IndexError, KeyError) as error:
+        raise UserError(f"COLMAP model of '{beside}': an image has no place in its rig ({error})") from None
     turn = world_to_camera[:, :, :3].transpose(0, 2, 1)
     poses = np.tile(np.eye(4), (len(images), 1, 1))
     poses[:, :3, :3], poses[:, :3, 3] = turn, -np.einsum("nij,nj->ni", turn, world_to_camera[:, :, 3])

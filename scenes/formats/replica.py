@@ -102,7 +102,7 @@ def _camera(file: Path, image: Path) -> tuple[Intrinsics, float]:
             f"camera parameters '{file}' are of pictures of {size[0]} x {size[1]}, but '{image}' is "
             f"{found[0]} x {found[1]}; scale w, h, fx, fy, cx and cy, or take the original pictures"
         )
-    unit = 1 / scale if np.isfinite(scale) and scale > 0 else 0.0
+    unit = 1 / scale if np.isfinite(scale) and scale > 1e-9 else 0.0  # 1 / 5e-324 is infinite
     return Intrinsics(fx, fy, cx + 0.5, cy + 0.5, f"'{file}'"), unit
 
 

@@ -51,7 +51,8 @@ def read(root: Path) -> Scene:
     own = {"camera": camera_file(*folders), "transform": next(_present(folders, TRANSFORM), None)}
     camera = read_camera(own["camera"]) if own["camera"] else COLOUR
     transform = matrix(own["transform"], "transform") if own["transform"] else DEPTH_TO_COLOUR
-    if not np.isfinite(transform).all() or abs(np.linalg.det(transform[:3, :3]) - 1) > 0.01:
+    rigid = np.isfinite(transform).all() and transform[3].tolist() == [0, 0, 0, 1]
+    if not rigid or not abs(np.linalg.det(transform[:3, :3]) - 1) <= 0.01:
         raise UserError(f"transform '{own['transform']}' is no rigid motion from the depth to the colour camera")
     if lists["Train"].is_file():
         train = _sequences(root, _named(root, lists["Train"]), camera, transform, notes)

@@ -13,6 +13,7 @@ from ...common.errors import UserError
 from ...common.files import read_json
 from ..image_files import image_size, is_file, leaves
 from ..types import Cameras, Points, Scene, Split
+from ._frames import times_of
 from ._transforms_write import COMPANIONS, LENS, SINGLE, TESTS, TRAIN, write
 
 __all__ = ["WRITABLE", "detect", "read", "write"]
@@ -80,6 +81,8 @@ def _listed(file: Path, table: dict, frames: Split) -> tuple[Split, Split, Split
     listed: dict[str, set[int]] = {}
     for key in ("train", "test", "val"):
         names = table.get(f"{key}_filenames") or []
+        if not isinstance(names, list):
+            raise UserError(f"'{file}': {key}_filenames is no list of names")
         unknown = [name for name in names if not isinstance(name, str) or name not in index]
         if unknown:
             raise UserError(f"'{file}': {key}_filenames names {unknown[0]!r}, which no frame has")
@@ -127,24 +130,13 @@ def _split(root: Path, file: Path, table: Any, allow_outside: bool) -> Split:
     )
     beside = (_beside(root, table["frames"], key) for key in COMPANIONS)
     masks, depths = (files if any(files) else () for files in beside)
-    return Split(tuple(names), tuple(paths), cameras, _times(times), lens, depths, masks)
+    return Split(tuple(names), tuple(paths), cameras, times_of(times), lens, depths, masks)
 
 
 def _beside(root: Path, frames: list[dict], key: str) -> tuple[Path | None, ...]:
     """The mask or depth image of each frame, where it is there."""
     named = (frame.get(key) for frame in frames)
     return tuple(root / name if isinstance(name, str) and is_file(root / name) else None for name in named)
-
-
-def _times(values: list[Any]) -> np.ndarray | None:
-    """(N,) seconds, or None unless every frame has a finite one."""
-    if not values or not all(isinstance(value, (int, float)) for value in values):
-        return None
-    try:
-        times = np.array(values, dtype=np.float64)
-    except OverflowError:
-        return None
-    return times if np.isfinite(times).all() else None
 
 
 def _lens(camera: Mapping[str, Any]) -> str:

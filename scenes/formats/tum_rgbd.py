@@ -7,6 +7,7 @@ import numpy as np
 
 from ...common.bounded import quoted
 from ...common.errors import UserError
+from ..image_files import is_file
 from ..types import Scene
 from ._frames import split
 from ._intrinsics import CAMERA, FORM, Intrinsics, camera_file, opencv, read_camera
@@ -101,7 +102,7 @@ def _depths(
     times, paths = _listed(root, "depth.txt")
     partner = associate(stamps, times)
     found = [None if j is None else paths[j] for j, good in zip(partner, kept, strict=True) if good]
-    here = [path if path is not None and path.is_file() else None for path in found]
+    here = [path if path is not None and is_file(path) else None for path in found]
     if not any(here):
         notes.append("depth images are left out: those that depth.txt names within 0.02 s of a frame are not there")
         return [], ()

@@ -1,8 +1,8 @@
 """A video file (by PyAV): frames chosen by content, time and sharpness, written with their original numbers."""
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from ...common.sources import code_sha256
 from ..digest import file_sha256
 from ..thinning import Thinning, frame_name, frame_number, kept
 from ..types import Scene, Split
+from . import _video_known
 from ._video_cache import drop, hold, trim
 from ._video_decode import frames
 from ._video_packets import Packets, opened, read_packets
@@ -103,46 +104,25 @@ def _read(
 def _table(root: Path, folder: Path) -> tuple[Packets, set[int]]:
     """The video's packets and the frames known to be damaged, from the cache where they are there."""
     file = folder / "packets.npz"
-    if not file.is_file():
+    packets = _video_known.packets(file)
+    if packets is None:
         packets = read_packets(root)
-        with whole(file) as temporary, open(temporary, "wb") as stream:
-            np.savez(
-                stream,
-                pts=packets.pts,
-                flags=packets.flags,
-                base=np.array([packets.time_base.numerator, packets.time_base.denominator]),
-                codec=np.array(packets.codec),
-                aspect=np.array(packets.aspect),
-                facts=np.array([packets.counted, packets.announced, packets.whole], dtype=np.int64),
-            )
-    with np.load(file, allow_pickle=False) as table:
-        counted, announced, complete = table["facts"].tolist()
-        base = Fraction(*table["base"].tolist())
-        packets = Packets(
-            table["pts"],
-            table["flags"],
-            base,
-            str(table["codec"]),
-            bool(counted),
-            announced,
-            bool(complete),
-            float(table["aspect"]),
-        )
-    lost = folder / "lost.json"
-    return packets, set(read_json(lost, "cached list") if lost.is_file() else [])
+        _video_known.keep(file, packets)
+    return packets, _video_known.lost(folder / "lost.json")
 
 
 def _facts(root: Path, folder: Path, packets: Packets) -> dict[str, Any]:
     """Size and dynamic range of the frames, of the first one that can be decoded."""
     file = folder / "facts.json"
-    if not file.is_file():
-        for number in range(min(len(packets.frames), TRIED)):
-            for _, frame in frames(root, packets, [number]):
-                look = look_of(frame, packets.aspect)
-                write_json(file, {"size": size(frame, look), "hdr": hdr(frame), "turn": look.turn})
-                return read_json(file, "cached facts")
-        raise UserError(f"video '{root}' has no frame that can be decoded")
-    return read_json(file, "cached facts")
+    known = _video_known.facts(file)
+    if known is not None:
+        return known
+    for number in range(min(len(packets.frames), TRIED)):
+        for _, frame in frames(root, packets, [number]):
+            look = look_of(frame, packets.aspect)
+            write_json(file, {"size": size(frame, look), "hdr": hdr(frame), "turn": look.turn})
+            return read_json(file, "cached facts")
+    raise UserError(f"video '{root}' has no frame that can be decoded")
 
 
 def _extract(
@@ -151,7 +131,8 @@ def _extract(
     """Puts the small pictures that are not in the folder there; returns the frames that cannot be decoded."""
     from PIL import Image
 
-    have = {path.name for path in folder.iterdir()}
+    with os.scandir(folder) as entries:
+        have = {entry.name for entry in entries if entry.stat().st_size}  # empty: the machine lost its power
     missing = [number for number in numbers if f"{frame_name(number)}.jpg" not in have]
     if not missing:
         return set()
@@ -163,7 +144,7 @@ def _extract(
         if progress:
             progress(len(missing) - len(left), len(missing), "")
     known = folder / "lost.json"
-    write_json(known, sorted(left | set(read_json(known, "cached list") if known.is_file() else [])))
+    write_json(known, sorted(left | _video_known.lost(known)))
     return left
 
 
