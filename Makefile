@@ -31,7 +31,7 @@ help:
 	@echo "make wheels      the package and, apart from it, the rendered rooms; make datasheet describes them"
 	@echo "make lock        requirements.lock and requirements-select.lock, after a change of what is needed"
 	@echo "make audit       known vulnerabilities of what the lock files name (asks PyPI; or ADVISORIES=FOLDER)"
-	@echo "make versions    Python 3.11 to 3.13, each with the least, the pinned and the newest packages (an hour)"
+	@echo "make versions    Python 3.11 to 3.13, each with the least, the pinned and the newest packages (an hour or two)"
 	@echo "make clean       removes what was installed and made, except results/; make clean-results removes those"
 
 $(VENV)/.installed: pyproject.toml constraints.txt
