@@ -254,7 +254,7 @@ def said_by_scheduler(logs: list[str]) -> str:
         path = Path(str(log).split(" ", 1)[0])
         if path.is_file():
             lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-            found = next((line for line in reversed(lines) if line.startswith("slurmstepd")), found)
+            found = next((line for line in reversed(lines) if line.startswith(("slurmstepd", "srun: error"))), found)
     return found
 
 
