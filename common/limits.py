@@ -12,6 +12,7 @@ LINES = 2_000_000
 LINE_LETTERS = 1 << 16
 NUMBERS = 20_000_000  # of one table: a million 4 x 4 matrices and more
 NAME_LETTERS = 4096  # of a frame: PATH_MAX of Linux
+SETTINGS_BYTES = 1 << 20  # they lie in the folder that one happens to be in
 STUDY_BYTES = 1 << 20
 STUDY_NODES = 100_000  # of a YAML file whose aliases are written out
 

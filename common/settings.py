@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
+from . import bounded, limits
 from .errors import UserError, nearest
 
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -192,9 +193,7 @@ def load(path: str | os.PathLike | None = None) -> Settings:
     """
     source = Path(path) if path else find()
     try:
-        raw = tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"settings '{source}' cannot be read: {error.strerror}") from None
+        raw = tomllib.loads(bounded.data(source, "settings", limits.SETTINGS_BYTES).decode("utf-8"))
     except (ValueError, RecursionError) as error:  # a number of thousands of digits is a ValueError of its own
         raise UserError(f"settings '{source}' is not valid TOML: {error}") from None
     _known(raw, [*SECTIONS, *TABLES], str(source), "section")

@@ -286,6 +286,12 @@ def _(folder):
     (folder / "environment.toml").write_text('[data]\nroot = "/"\n')
 
 
+@attack("settings of 1 GB in the current folder", "info .", says="at most 1.05 MB")
+def _(folder):
+    posed(folder)
+    sparse(folder / "environment.toml", 1 << 30)
+
+
 # Names
 
 NAMES = ["images/a\nb.png", "images/\x1b[2J\x1b]0;x\x07.png", "images/$(touch pwned).png", "images/-rf.png"]
@@ -736,7 +742,7 @@ def outcomes(names: list[str], folder: Path) -> list[Result]:
         before = found(place)
         for command in ATTACKS[name].commands:
             words = [word.format(scene="scene", out="out") for word in shlex.split(command)]
-            inside = name == "settings in the capture"
+            inside = name.startswith("settings")
             if inside:
                 words = ["../scene" if word == "scene" else word for word in words]
             status, seconds, kilobytes = ran(words, scene if inside else place, place)
