@@ -66,6 +66,8 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
     try:
         bounded.checked(path, limits.IMAGE_BYTES)
         with Image.open(path, formats=formats) as image:
+            if max(image.size) > limits.SIDE:
+                raise OSError(f"it is {image.size[0]} x {image.size[1]}; sides of up to {limits.SIDE:,} are read")
             if not head and image.format in ("JPEG", "MPO") and "progressive" in image.info:
                 _check_scans(path)
             with silenced(image.format == "TIFF"):

@@ -15,7 +15,7 @@ from unittest import mock
 from tests.fuzz._reader import Input, Reader, changes, lay_out
 from tests.fuzz._worker import Board, Finding, mind_warnings, save, valid_capture, work
 
-LIMIT_S = 20.0  # of CPU for one input, which is read up to five times; or waiting for so many times that
+LIMIT_S = 40.0  # of CPU for one input, which is read up to five times; or waiting for so many times that
 WAITS = 12
 SHORT = Path("/dev/shm") if Path("/dev/shm").is_dir() else Path(tempfile.gettempdir())
 

@@ -180,6 +180,13 @@ def test_a_png_at_whose_chunk_pil_fails_by_an_index(tmp_path):
     assert "a.png" in refused(check_whole, tmp_path / "a.png")
 
 
+def test_a_picture_that_is_one_line_of_a_million_pixels(tmp_path):
+    made = io.BytesIO()
+    Image.new("1", (2_000_000, 1)).save(made, format="PNG")
+    (tmp_path / "a.png").write_bytes(made.getvalue())
+    assert "2000000 x 1" in refused(image_size, tmp_path / "a.png")
+
+
 def tags_of_nothing(path) -> None:
     """A photo whose EXIF says that a tag's data lie beyond its end."""
     data = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x0f\0\x02\xff\xff\xff\x00\0\0\0\x08"
