@@ -19,6 +19,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 SECRET = "correct-horse-battery-staple"
 MEMORY = 12 << 30  # bytes of addresses; what is used is far less
@@ -372,7 +373,7 @@ def _(folder):
 
 @attack("5,000 keys for each of 5,000 frames", "info {scene}", says="twice")
 def _(folder):
-    posed(folder, **{f"key{i}": i for i in range(5_000)})
+    posed(folder, None, **{f"key{i}": i for i in range(5_000)})
     frame = json.loads((folder / "transforms.json").read_text())["frames"][0]
     frames = [{**frame, "file_path": f"images/{i}.png"} for i in range(5_000)]
     edited(folder, lambda table: table.update(frames=[*frames, frames[-1]]))
@@ -722,7 +723,7 @@ def clip(path: Path, codec: str = "mpeg4", pixels: str = "yuv420p", frames: int 
     import numpy as np
 
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=10)
+        stream: Any = container.add_stream(codec, rate=10)  # whose stubs know no variable for a codec
         stream.width, stream.height, stream.pix_fmt = 64, 48, pixels
         container.start_encoding()
         for i in range(frames):
@@ -749,7 +750,7 @@ def outcomes(names: list[str], folder: Path) -> list[Result]:
             said = [(place / stream).read_text(errors="replace") for stream in ("stdout", "stderr")]
             left = sorted(found(place) - before - {"stdout", "stderr"})
             pages = "".join((place / file).read_text() for file in left if file.endswith(".html"))
-            results.append(Result(name, command, status, seconds, kilobytes // 1024, *said, left, pages))
+            results.append(Result(name, command, status, seconds, kilobytes // 1024, said[0], said[1], left, pages))
             before |= set(left)
         shutil.rmtree(place)
     return results

@@ -89,8 +89,11 @@ print(*[name for name in sys.modules if name.startswith("viewbench.")], file=sys
         for path in files("workflow.commands.select", "selectors.uniform", "scenes.formats.transforms")
     }
     undeclared = {name for name in loaded - declared if sources._file(name)}
-    # What is said of errors, what is done next, what stops a job.
-    no_matter = {"workflow.commands._main", "workflow._again", "workflow._follow", "common.extras"}
+    # What is said of errors and how, what is done next, what stops a job.
+    no_matter = {
+        *("workflow.commands._main", "workflow._again", "workflow._follow"),
+        *("common.extras", "common.terminal"),
+    }
     assert {name for name in undeclared if not name.startswith("scenes.formats.")} <= no_matter
 
 
