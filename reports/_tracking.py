@@ -27,6 +27,7 @@ __all__ = ["CELL", "FINGERPRINT", "KEY", "NO_TRACKING", "is_remote", "local_uri"
 KEY = AXES
 NO_TRACKING = "tracking.uri is empty"  # why nothing is logged where nobody wants it
 STRIKES = 5  # tries of a cell that a server in trouble does not take, while it answers otherwise
+DOUBTED = 4  # times that a refused user asks again: MLflow's server says 401, too, where its database is in trouble
 PAUSES_S = (1, 2, 4, 8, 15)  # between asking a store that is away; the last one again and again
 # Seconds of MLflow's own patience with one request, and how often it repeats it: a study logs hundreds of runs. A job
 # of one cell gives up sooner, since the end of the study logs what it did not.
@@ -160,7 +161,8 @@ class _Patience:
                 return value
             except _tracking_errors.errors() as error:
                 left_s = self.answered + self.tracking.patience - time.monotonic()
-                if _tracking_errors.kind(error) is not Kind.AWAY or left_s <= 0:
+                doubted = _tracking_errors.refuses_user(error) and tries < DOUBTED
+                if not (doubted or _tracking_errors.kind(error) is Kind.AWAY) or left_s <= 0:
                     raise
                 said = _tracking_errors.words(error, self.tracking.uri)
                 if not tries:

@@ -68,9 +68,14 @@ def kind(error: BaseException) -> Kind:
     status = _status(error)
     if isinstance(error, (OSError, ValueError, ImportError)) and not isinstance(error, RequestException):
         return Kind.REFUSED
-    if status in (401, 403) or UNTRUSTED in str(error) or _is_damage(str(error)) or _is_another(error, status):
+    if refuses_user(error) or UNTRUSTED in str(error) or _is_damage(str(error)) or _is_another(error, status):
         return Kind.REFUSED
     return Kind.AWAY if status is None or status in AWAY_STATUS else Kind.CELL
+
+
+def refuses_user(error: BaseException) -> bool:
+    """Whether the answer was that this user may not."""
+    return _status(error) in (401, 403)
 
 
 def words(error: BaseException, uri: str) -> str:
