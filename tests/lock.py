@@ -23,7 +23,7 @@ from viewbench.common.settings import PACKAGE
 # By file: the extras that it is for. Not in them: dev, gpu and render, which want more than packages.
 LOCKS = {
     "requirements-select.lock": (),
-    "requirements.lock": ("study", "video", "heic", "match", "plot", "lpips", "download"),
+    "requirements.lock": ("study", "cluster", "video", "heic", "match", "plot", "lpips", "download"),
 }
 HEAD = """\
 # {what}, with the hashes of PyPI's files; `make lock` writes it.
