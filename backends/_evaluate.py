@@ -17,7 +17,7 @@ from ..common.holding import alone
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
-from ..scenes.image_files import leaves
+from ..scenes.image_files import is_file, leaves
 from ..scenes.images import Picture, read_images
 from ..scenes.pictures import picture_name, save_png, to_uint8
 from ..scenes.types import Scene
@@ -137,7 +137,7 @@ def altered_file(model: Path, train: dict[str, Any]) -> str | None:
     """
     for name, sha256 in train["files"].items():
         file = model / name
-        if leaves(name) or file.is_symlink() or not file.is_file() or sha256_file(file) != sha256:
+        if leaves(name) or not is_file(file) or file.is_symlink() or sha256_file(file) != sha256:
             return name
     return None
 

@@ -70,13 +70,14 @@ def load(path: Path) -> Gaussians:
     try:
         vertex = vertices(path)
         rest = sum(name.startswith("f_rest_") for name in vertex.dtype.names or ()) // 3
-        columns = np.stack([vertex[name] for name in fields(rest) if not name.startswith("n")], axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):
+            columns = np.stack([vertex[name] for name in fields(rest) if not name.startswith("n")], axis=1)
+            columns = columns.astype(np.float32)
     except OSError as error:
         raise UserError(f"model '{path}' cannot be read: {error.strerror}; train it again") from None
     except MemoryError:
         raise UserError(f"model '{path}' cannot be read: there is not enough memory for it") from None
     except ValueError as error:
         raise UserError(f"model '{path}' is not a PLY file of 3D Gaussians: {error}") from None
-    columns = columns.astype(np.float32)
     means, sh0, shn, opacities, scales, quats = np.split(columns, np.cumsum([3, 3, 3 * rest, 1, 3]), axis=1)
     return Gaussians(means, scales, quats, opacities[:, 0], sh0, shn.reshape(len(shn), 3, rest).transpose(0, 2, 1))

@@ -1,5 +1,6 @@
 """SSIM and LPIPS of a rendered view, the same for every backend."""
 
+import contextlib
 import functools
 import math
 import threading
@@ -11,6 +12,7 @@ import numpy as np
 from ..common import extras  # no source: it says what to install
 from ..common.errors import UserError
 from ..common.files import sha256_file
+from ..common.settings import at_home
 
 
 def ssim(image: np.ndarray, truth: np.ndarray) -> float:
@@ -41,12 +43,14 @@ def lpips_weights(configured: str) -> Path | None:
     Raises UserError when a configured file is missing.
     """
     if configured:
-        path = Path(configured).expanduser()
+        path = at_home(configured)
         if not path.is_file():
             raise UserError(f"metrics.lpips_weights '{configured}' is no file; correct it or leave it empty")
         return path
-    cached = Path("~/.cache/torch/hub/checkpoints/alexnet-owt-7be5be79.pth").expanduser()
-    return cached if cached.is_file() else None
+    with contextlib.suppress(RuntimeError):  # nobody's home
+        cached = Path("~/.cache/torch/hub/checkpoints/alexnet-owt-7be5be79.pth").expanduser()
+        return cached if cached.is_file() else None
+    return None
 
 
 def lpips_sha256(configured: str) -> str | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..common.errors import UserError, nearest
 from ..common.files import read_json, sha256_file, write_json
-from ..common.settings import Settings
+from ..common.settings import Settings, at_home
 from ..scenes.types import Cameras
 from . import _ngp_driver, _process, _subset
 from ._memory import Usage
@@ -54,7 +54,7 @@ class InstantNgp:
     def available(self) -> str | None:
         if not self.checkout:
             return f"no checkout is configured; {BUILD}"
-        folder = Path(self.checkout).expanduser()
+        folder = at_home(self.checkout)
         if not folder.is_dir():
             return f"[instant_ngp] path '{folder}' is not there; {BUILD}"
         if not _ngp_driver.modules(folder):
@@ -74,7 +74,7 @@ class InstantNgp:
         """The checkout's commit, where it is a git checkout, and hashes of its networks and the module built there."""
         if not self.checkout:
             raise UserError(f"instant-ngp has no version: no checkout is configured; {BUILD}")
-        folder = Path(self.checkout).expanduser()
+        folder = at_home(self.checkout)
         module = next(iter(_ngp_driver.modules(folder)), None)
         built = "no module" if module is None else f"sha256:{sha256_file(module)[:12]}"
         networks = "".join(f"{name} {sha256_file(file)}\n" for name, file in _ngp_driver.configurations(folder).items())
@@ -96,7 +96,7 @@ class InstantNgp:
         outside of the box, and, with its last line, when it fails.
         """
         _check(data, options)
-        networks = _ngp_driver.configurations(Path(self.checkout).expanduser())
+        networks = _ngp_driver.configurations(at_home(self.checkout))
         if options["network"] not in networks:
             close = nearest(options["network"], networks)
             raise UserError(f"its configs/nerf has no network '{options['network']}'{close} ({', '.join(networks)})")
@@ -150,7 +150,7 @@ class InstantNgp:
     ) -> Usage:
         """Runs one action of _ngp_driver.py under the checkout's Python; paths are made absolute."""
         command = [self.python, str(Path(_ngp_driver.__file__).resolve()), action]
-        command.append(str(Path(self.checkout).expanduser().resolve()))
+        command.append(str(at_home(self.checkout).resolve()))
         for name, value in arguments.items():
             command += [f"--{name}", str(value.resolve() if isinstance(value, Path) else value)]
         return _process.run(command, folder, log, f"instant-ngp ({action})", timeout_s)

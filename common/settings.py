@@ -112,10 +112,10 @@ class Settings:
         """Where a scene should lie; None where that is below data.root, which is not set."""
         if entry.path.startswith("package:"):
             return _shipped(entry.path.removeprefix("package:"))
-        path = Path(entry.path).expanduser()
+        path = at_home(entry.path)
         if path.is_absolute():
             return path
-        return Path(self.data.root).expanduser() / path if self.data.root else None
+        return at_home(self.data.root) / path if self.data.root else None
 
     def dataset_of(self, scene: str, otherwise: str) -> str:
         """The group that tables put a scene in; `otherwise` where the file names none."""
@@ -176,6 +176,14 @@ SECTIONS: dict[str, type] = {
 # No renders, no waiting, no limit, the first model, no other attempt.
 MAY_BE_ZERO = ("renders", "patience", "timeout", "model", "retries", "retry_wait")
 TABLES: dict[str, type] = {"scenes": SceneEntry, "command": Command}
+
+
+def at_home(path: str) -> Path:
+    """The path, with `~` and `~name` as the home they stand for. Raises UserError where nobody has that home."""
+    try:
+        return Path(path).expanduser()
+    except (RuntimeError, ValueError):
+        raise UserError(f"'{path}' begins with a home that is nobody's here; write the whole path") from None
 
 
 def find() -> Path:
@@ -241,7 +249,10 @@ def _section(kind: type, values: Any, where: str) -> Any:
         if wanted is list and not all(isinstance(item, (int, float) if numbers else str) for item in value):
             raise UserError(f"{where}: '{name}' must be a list of {'numbers' if numbers else 'strings'}")
         if numbers:
-            values = {**values, name: [float(item) for item in value]}
+            try:
+                values = {**values, name: [float(item) for item in value]}
+            except OverflowError:
+                raise UserError(f"{where}: '{name}' has a number that is too large") from None
     try:
         return kind(**values)
     except TypeError:

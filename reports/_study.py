@@ -10,6 +10,7 @@ from typing import Any
 
 from ..common.errors import UserError
 from ..common.files import read_json
+from ._study_kinds import check_kinds
 
 FULL = "full"  # the selector name of the full-data reference
 OK = "ok"
@@ -173,6 +174,7 @@ def load(study_dir: Path) -> Study:
     record = read_json(folder / "study.json", "study")
     cells = read_cells(folder / "results.csv", folder / "cells")
     try:
+        check_kinds(record)
         return Study(
             folder=folder,
             name=record["name"],

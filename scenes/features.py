@@ -134,10 +134,14 @@ def load_user_features(path: Path, n: int) -> np.ndarray:
     if getattr(array, "ndim", 0) != 2 or array.dtype.kind not in "fiu" or len(array) != n:
         found = f"{array.dtype} of shape {array.shape}" if isinstance(array, np.ndarray) else "several arrays"
         raise UserError(f"features '{path}' are {found}, expected numbers with one row for each of {n} training views")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    with np.errstate(over="ignore", invalid="ignore"):
+        rows = array.astype(np.float32)
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(bad):
-        raise UserError(f"features '{path}' have NaN or infinity in row {bad[0]}; embed that image again")
-    return array.astype(np.float32)
+        raise UserError(
+            f"features '{path}' have NaN, infinity or what float32 cannot hold in row {bad[0]}; embed that image again"
+        )
+    return rows
 
 
 def content_hash(path: Path) -> str:

@@ -17,12 +17,14 @@ def read_points(path: Path) -> Points:
     """
     try:
         vertex = vertices(path)
-        xyz = np.stack([vertex[axis] for axis in "xyz"], axis=1).astype(np.float64)
+        with np.errstate(invalid="ignore"):
+            xyz = np.stack([vertex[axis] for axis in "xyz"], axis=1).astype(np.float64)
         named = set(vertex.dtype.names or ())
         channels = ("red", "green", "blue")
         rgb = np.full((len(xyz), 3), 128, dtype=np.uint8)
         if set(channels) <= named:
-            rgb = np.stack([vertex[channel] for channel in channels], axis=1).astype(np.uint8)
+            with np.errstate(invalid="ignore"):  # colours of NaN
+                rgb = np.stack([vertex[channel] for channel in channels], axis=1).astype(np.uint8)
     except MemoryError:
         raise UserError(f"points '{path}' cannot be read: there is not enough memory for them") from None
     except (ValueError, OSError) as error:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..common.errors import UserError
-from ..common.settings import SceneEntry, Settings
+from ..common.settings import SceneEntry, Settings, at_home
 
 TRAJECTORY = "trajectory"
 POSED = ("poses", "intrinsics", "times")  # of a folder of images
@@ -54,5 +54,5 @@ def _posed(root: Path, entry: SceneEntry | None, given: Mapping[str, Any]) -> di
         elif given.get(key):
             told[key] = Path(given[key])
         elif listed:
-            told[key] = root / Path(listed).expanduser()
+            told[key] = root / at_home(listed)
     return {key: value for key, value in told.items() if value}

@@ -61,8 +61,10 @@ def read(root: Path, encoder: str, made_by: Callable[[], dict[str, Any]]) -> dic
     except (OSError, ValueError, EOFError, MemoryError) as error:
         raise UserError(f"features '{file}' cannot be read: {error}; {mend}") from None
     pictures = record["pictures"]
-    lengths = np.linalg.norm(rows.astype(np.float32), axis=1) if getattr(rows, "ndim", 0) == 2 else np.zeros(0)
-    if len(lengths) != len(pictures) or rows.dtype != np.float16 or not (np.isfinite(lengths) & (lengths > 0)).all():
+    fit = getattr(rows, "ndim", 0) == 2 and rows.dtype == np.float16 and len(rows) == len(pictures)
+    with np.errstate(invalid="ignore"):
+        lengths = np.linalg.norm(rows.astype(np.float32), axis=1) if fit else np.zeros(0)
+    if not fit or not (np.isfinite(lengths) & (lengths > 0)).all():
         raise UserError(f"features '{file}' are not {len(pictures)} rows of float16 that are not zero; {mend}")
     return dict(zip(pictures, rows.astype(np.float32) / lengths[:, None], strict=True))
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ..common import catalogue, extras
-from ..common.settings import SceneEntry, Settings
+from ..common.settings import SceneEntry, Settings, at_home
 
 
 def absence(names: Iterable[str], settings: Settings, study: bool = False) -> str | None:
@@ -54,7 +54,7 @@ def renderable(names: Iterable[str], settings: Settings) -> list[str]:
 
 def python_of(settings: Settings) -> str:
     """The Python that renders rooms."""
-    return str(Path(settings.rooms.python).expanduser()) if settings.rooms.python else sys.executable
+    return str(at_home(settings.rooms.python)) if settings.rooms.python else sys.executable
 
 
 def renders(settings: Settings) -> bool:

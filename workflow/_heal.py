@@ -92,7 +92,7 @@ def _sound_table(results: Path) -> bool:
 
 def _whole_model(folder: Path, read: bool) -> bool:
     """Whether all files of the model are there and as long as `train.json` says; with `read`, and as it says."""
-    with contextlib.suppress(UserError, AttributeError, KeyError, TypeError, OSError):
+    with contextlib.suppress(UserError, AttributeError, KeyError, TypeError, ValueError, OSError):
         train = read_json(folder / "train.json")
         if read:
             return altered_file(folder, train) is None
@@ -102,7 +102,7 @@ def _whole_model(folder: Path, read: bool) -> bool:
 
 def _whole_renders(folder: Path, read: bool) -> bool:
     """Whether all renders are there and as long as `metrics.json` says; with `read`, and as it says."""
-    with contextlib.suppress(UserError, AttributeError, KeyError, TypeError, OSError):
+    with contextlib.suppress(UserError, AttributeError, KeyError, TypeError, ValueError, OSError):
         views: list[dict[str, Any]] = read_json(folder / "metrics.json")["views"]
         whole = all(_has(folder / view["file"], view.get("bytes")) for view in views)
         return whole and (

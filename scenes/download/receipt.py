@@ -10,6 +10,7 @@ from ...common import plugins
 from ...common.catalogue import DataSet, Listed
 from ...common.errors import UserError
 from ...common.files import read_json, write_json
+from ..image_files import is_file
 
 RECEIPT = "download.json"  # in the scene's folder: what it was made from, and what belongs to it
 
@@ -29,7 +30,7 @@ def is_there(scene: Listed, data: DataSet, root: Path) -> bool:
         if wrong:
             raise UserError(
                 f"'{folder}' is there, but {len(wrong)} of its {len(files)} files are missing or changed, such as "
-                f"'{wrong[0]}'; --force fetches it again"
+                f"'{wrong[0][:200]}'; --force fetches it again"
             )
     elif not plugins.load("scenes.formats", data.format).detect(folder):
         raise UserError(f"'{folder}' is there, and is no {data.format} capture; remove it, or --force replaces it")
@@ -83,4 +84,4 @@ def _move_added(old: Path, folder: Path) -> None:
 
 
 def _size(path: Path) -> int | None:
-    return path.stat().st_size if path.is_file() else None
+    return path.stat().st_size if is_file(path) else None

@@ -178,8 +178,13 @@ def _reduced(source: Path, wanted: Sequence[str], points: Points | None) -> Any:
     import pycolmap
 
     model, kept = pycolmap.Reconstruction(source), set(wanted)
-    whole = {frame_id: {model.images[i.id].name for i in frame.data_ids} for frame_id, frame in model.frames.items()}
-    if any(names & kept and not names <= kept for names in whole.values()):
+    try:
+        whole = [{model.images[i.id].name for i in frame.data_ids} for frame in model.frames.values()]
+    except KeyError as error:
+        raise UserError(
+            f"COLMAP model '{source}' is damaged: its frames have image {str(error)[:40]}, which it does not have"
+        ) from None
+    if any(names & kept and not names <= kept for names in whole):
         model = _without_rigs(model, kept)  # a frame goes or stays with all of its cameras
     for image in list(model.images.values()):
         if image.name not in kept and image.has_pose:

@@ -159,7 +159,7 @@ def _camera(file: Path, table: dict) -> Intrinsics:
         last = float(table.get("k4") or 0.0)
     except (KeyError, TypeError, ValueError, OverflowError):
         raise UserError(f"'{file}' lacks fl_x, fl_y, cx or cy, or one of them is no number") from None
-    model = str(table.get("camera_model", "PINHOLE"))
+    model = " ".join(str(table.get("camera_model", "PINHOLE")).split())
     model = "" if model in ("PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "RADIAL", "SIMPLE_RADIAL") else model
     if last and not model:
         model = "OPENCV with k4"

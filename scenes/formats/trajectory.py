@@ -179,7 +179,7 @@ def _stamps(paths: tuple[Path, ...], times: Path | None) -> np.ndarray | None:
     if times is None:
         found = [STAMP.fullmatch(path.stem) for path in paths]
         return seconds(np.array([float(match[1]) for match in found if match])) if all(found) else None
-    rows = [(number, line.replace(",", " ").split(maxsplit=1)) for number, line in lines(times, "times")]
+    rows = [(number, line.replace(",", " ").split(maxsplit=1) or [line]) for number, line in lines(times, "times")]
     stamps, names = [], []
     for number, words in rows:
         try:

@@ -141,7 +141,7 @@ def _beside(root: Path, frames: list[dict], key: str) -> tuple[Path | None, ...]
 
 def _lens(camera: Mapping[str, Any]) -> str:
     """The camera model where it is another one than OpenCV's with k1, k2, p1, p2, k3."""
-    model = str(camera.get("camera_model", ""))
+    model = " ".join(str(camera.get("camera_model", "")).split())
     if model not in LENSES:
         return model
     if camera.get("is_fisheye"):  # instant-ngp's word for it

@@ -371,7 +371,7 @@ def opens_cell(given: Input) -> None:
 
     for name in ("selection", "train", "metrics"):
         _sound(given.root / f"{name}.json")
-    _whole_model(given.root)
+    _whole_model(given.root, given.rng.random() < 0.5)
     row = _figures(CELL, given.root, _asked())
     for key in ("psnr_db", "ssim", "train_s", "select_s", "evaluate_s"):
         none = key in ("psnr_db", "ssim") and row[key] == ""

@@ -476,3 +476,128 @@ def test_what_is_damaged_in_the_cache_of_a_video_is_found_out_anew(tmp_path, mon
     assert after.train.names == before.train.names
     np.testing.assert_array_equal(after.train.times, before.train.times)
     check_present(after)
+
+
+def test_a_frame_of_a_model_whose_image_is_taken_out_of_the_list(tmp_path):
+    _scenes.of_colmap("txt", tmp_path)
+    images = tmp_path / "model" / "sparse" / "0" / "images.txt"
+    assert (images.parent / "frames.txt").is_file()
+    rows = images.read_text().split("\n")
+    at = 2 + next(number for number, row in enumerate(rows) if row and not row.startswith("#"))
+    images.write_text("\n".join([*rows[:at], *rows[at + 2 :]]))
+    scene = open_scene(str(tmp_path / "model"), _scenes.SETTINGS)
+    assert "damaged" in refused(write_scene, scene, np.arange(len(scene.train)), tmp_path / "out", "colmap")
+
+
+def test_names_in_records_longer_than_a_file_system_takes(tmp_path):
+    from viewbench.backends._evaluate import altered_file
+
+    name = "a" * 300
+    _records.of_downloads(tmp_path)
+    (tmp_path / "set" / "room" / "download.json").write_text(json.dumps({"files": {name: 5}}))
+    assert "changed" in refused(is_there, _records.LISTED, _records.DATA, tmp_path)
+    assert altered_file(tmp_path, {"files": {name: "0" * 64}}) == name
+
+
+def test_features_that_are_no_numbers_of_32_bits(tmp_path, recwarn):
+    rows = np.ones((3, 4))
+    np.save(tmp_path / "a.npy", rows * 1e30)
+    assert features.load_user_features(tmp_path / "a.npy", 3).dtype == np.float32
+    rows[1, 2] = 1e300
+    np.save(tmp_path / "a.npy", rows)
+    assert "row 1" in refused(features.load_user_features, tmp_path / "a.npy", 3)
+    assert [str(one.message) for one in recwarn if one.category is RuntimeWarning] == []
+
+
+SIGNALLING = np.full((3, 4), 0x7C01, np.uint16).view(np.float16)  # NaN at which processors raise "invalid"
+
+
+@pytest.mark.parametrize("rows", [SIGNALLING, np.full((3, 4), "a"), np.ones((3, 4), complex), np.ones((2, 4), "f2")])
+def test_shipped_features_that_are_none(tmp_path, rows, recwarn):
+    from viewbench.scenes import shipped_features
+
+    _files.of_shipped(tmp_path)
+    file = tmp_path / "features" / "enc.npy"
+    assert len(shipped_features.read(tmp_path, "enc", lambda: _files.MADE_BY)) == 3
+    np.save(file, rows)
+    file.with_suffix(".sha256").write_text(shipped_features._sums(file))
+    assert "enc.npy" in refused(shipped_features.read, tmp_path, "enc", lambda: _files.MADE_BY)
+    assert [str(one.message) for one in recwarn if one.category is RuntimeWarning] == []
+
+
+def mixed(path, names) -> None:
+    """A PLY of one vertex: signalling NaN of 32 bits, beside the second column's 1e300 of 64."""
+    kinds = ["double" if number == 1 else "float" for number in range(len(names))]
+    head = "".join(f"property {kind} {name}\n" for kind, name in zip(kinds, names, strict=True))
+    values = [struct.pack("<d", 1e300) if kind == "double" else struct.pack("<I", 0x7F800001) for kind in kinds]
+    begin = "ply\nformat binary_little_endian 1.0\nelement vertex 1\n"
+    path.write_bytes(f"{begin}{head}end_header\n".encode() + b"".join(values))
+
+
+def test_points_and_gaussians_of_kinds_that_do_not_fit_each_other(tmp_path, recwarn):
+    from viewbench.backends import _gaussian_ply
+    from viewbench.scenes.ply import read_points
+
+    mixed(tmp_path / "a.ply", ["x", "y", "z", "red", "green", "blue"])
+    assert len(read_points(tmp_path / "a.ply")) == 1
+    mixed(tmp_path / "b.ply", _gaussian_ply.fields(0))
+    assert np.isinf(_gaussian_ply.load(tmp_path / "b.ply").means[0, 1])
+    assert [str(one.message) for one in recwarn if one.category is RuntimeWarning] == []
+
+
+STUDIES = [
+    *[("ratios", [None]), ("ratios", 3), ("selectors", [{"name": 1e5, "selector": "a"}]), ("selectors", ["a"])],
+    *[("backends", [{"name": "splat", "grid": []}]), ("backends", [{"name": "splat", "grid": {"ratios": ["a"]}}])],
+    *[("title", 3), ("scenes", [[]]), ("seeds", "ab")],
+]
+
+
+@pytest.mark.parametrize(("key", "value"), STUDIES)
+def test_descriptions_of_studies_with_parts_of_other_kinds(tmp_path, key, value):
+    from tests.reports.fixtures import make_study
+    from viewbench.reports import _study as of_reports
+
+    folder = make_study(tmp_path / "study", scenes=("room_human",), selectors=("random",), ratios=(0.1,), seeds=(0,))
+    record = json.loads((folder / "study.json").read_text())
+    assert of_reports.load(folder).ratios == (0.1,)
+    (folder / "study.json").write_text(json.dumps({**record, key: value}))
+    assert "study.json" in refused(of_reports.load, folder)
+
+
+def test_a_camera_model_of_two_lines(tmp_path):
+    _scenes.of_scannetpp("fisheye", tmp_path)
+    file = tmp_path / "dslr" / "nerfstudio" / "transforms.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "camera_model": "MY\n\tOWN"}))
+    scene = open_scene(str(tmp_path), _scenes.SETTINGS)
+    assert scene.train.lens == "MY OWN"
+    assert any("MY OWN" in note for note in scene.notes)
+
+
+def test_a_colour_of_a_command_that_no_machine_holds(tmp_path):
+    (tmp_path / "a.toml").write_text(f'[command.x]\ntrain = ["a"]\nbackground = [0, 0, 1{"0" * 400}]\n')
+    assert "background" in refused(settings_file.load, tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize("place", ["~nobody-of-this-name/a", "~nobody\\u0000/a"])
+def test_a_home_that_is_nobodys(tmp_path, place):
+    (tmp_path / "a.toml").write_text(f'[scenes.a]\npath = "{place}"\n[data]\nroot = "~"\n')
+    settings = settings_file.load(tmp_path / "a.toml")
+    assert "home" in refused(settings.folder_of, settings.scenes["a"])
+
+
+@pytest.mark.parametrize("at", [0, 2])
+def test_a_line_of_times_that_has_commas_alone(tmp_path, at):
+    _scenes.of_trajectory(tmp_path, True)
+    times = tmp_path / "times.txt"
+    rows = times.read_text().split("\n")
+    times.write_text("\n".join([*rows[:at], ",", *rows[at:]]))
+
+    def opened():
+        return open_scene(
+            str(tmp_path / "room0"), _scenes.SETTINGS, poses=str(tmp_path / "poses.txt"), times=str(times)
+        )
+
+    if at:
+        assert "line 3" in refused(opened)
+    else:
+        assert opened().train.times is not None  # a heading

@@ -36,7 +36,7 @@ def command(names: tuple[str, ...], folder: Path | None, listing: bool, accept_l
     from ...scenes.download.receipt import is_there
 
     settings = settings_file.load()
-    root = folder or (Path(settings.data.root).expanduser() if settings.data.root else None)
+    root = folder or (settings_file.at_home(settings.data.root) if settings.data.root else None)
     if listing:
         _list(names, root)
         return

@@ -90,6 +90,8 @@ def environment(settings: Any) -> dict[str, str]:
 
     One thread a job as `compute.threads` says, unless the caller has set otherwise.
     """
+    from ...common.settings import at_home
+
     found = dict(os.environ)
     # Where pip puts `viewbench`: beside Python, or with --user in a folder of the user's.
     user = sysconfig.get_preferred_scheme("user")
@@ -100,7 +102,7 @@ def environment(settings: Any) -> dict[str, str]:
         found[CATALOGUE] = str(Path(found[CATALOGUE]).absolute())
     for variable, (section, key) in READ.items():
         value = getattr(getattr(settings, section), key)
-        path = Path(value).expanduser()
+        path = at_home(value)
         if value and not path.is_absolute() and path.exists():
             found[variable] = str(path.absolute())
     return dict.fromkeys(THREADS, str(settings.compute.threads)) | found

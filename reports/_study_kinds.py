@@ -1,0 +1,43 @@
+"""Whether study.json has what reports take from it, of the kinds that `collect` writes."""
+
+from typing import Any
+
+TEXTS = ("name", "title", "description")
+LISTS: dict[str, type | tuple[type, ...]] = {
+    "scenes": str,
+    "selectors": dict,
+    "ratios": (int, float),
+    "seeds": int,
+    "backends": dict,
+}
+NAMED: dict[str, dict[str, type]] = {  # entries of these lists: what they have, by its kind
+    "selectors": {"name": str, "selector": str},
+    "backends": {"name": str},
+}
+GRID = {"selectors": str, "ratios": (int, float)}
+
+
+def check_kinds(record: Any) -> None:
+    """Raises KeyError, with its name, for a part that the record lacks or that is of another kind."""
+    if not isinstance(record, dict):
+        raise KeyError("everything")
+    for key in TEXTS:
+        if not isinstance(record[key], str):
+            raise KeyError(key)
+    for key, kind in LISTS.items():
+        _check_list(record[key], kind, key)
+    for key, parts in NAMED.items():
+        for entry in record[key]:
+            if not all(isinstance(entry.get(name), kind) for name, kind in parts.items()):
+                raise KeyError(key)
+    for entry in record["backends"]:
+        grid = entry.get("grid", {})
+        if not isinstance(grid, dict):
+            raise KeyError("grid")
+        for key, kind in GRID.items():
+            _check_list(grid.get(key, []), kind, "grid")
+
+
+def _check_list(values: Any, kind: type | tuple[type, ...], key: str) -> None:
+    if not isinstance(values, list) or not all(isinstance(value, kind) for value in values):
+        raise KeyError(key)
