@@ -139,7 +139,7 @@ def load_user_features(path: Path, n: int) -> np.ndarray:
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(bad):
         raise UserError(
-            f"features '{path}' have NaN, infinity or what float32 cannot hold in row {bad[0]}; embed that image again"
+            f"features '{path}' have NaN or infinity in row {bad[0]} (as float32); embed that image again"
         )
     return rows
 

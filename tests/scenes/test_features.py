@@ -203,7 +203,7 @@ def test_user_features(tmp_path):
         with pytest.raises(UserError, match=message):
             load_user_features(file, n)
     np.savez(tmp_path / "f.npz", a=np.ones((4, 3)))
-    for path, message in (("f.npz", "several arrays"), ("missing.npy", "No such file")):
+    for path, message in (("f.npz", "not a .npy file"), ("missing.npy", "No such file")):
         with pytest.raises(UserError, match=message):
             load_user_features(tmp_path / path, 4)
     for contents in (b"", b"\x93NUMPY", b"hello"):
