@@ -142,7 +142,7 @@ def _shipped(path: str) -> Path:
     found = importlib.util.find_spec(ROOMS_PACKAGE)
     places += [Path(place) for place in (found.submodule_search_locations or ())] if found else []
     for place in places:
-        if (place / path).exists():
+        if os.path.exists(place / path):  # noqa: PTH110
             return place / path
     if (PACKAGE / "pyproject.toml").is_file():
         return PACKAGE / path

@@ -138,9 +138,7 @@ def load_user_features(path: Path, n: int) -> np.ndarray:
         rows = array.astype(np.float32)
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(bad):
-        raise UserError(
-            f"features '{path}' have NaN or infinity in row {bad[0]} (as float32); embed that image again"
-        )
+        raise UserError(f"features '{path}' have NaN or infinity in row {bad[0]} (as float32); embed that image again")
     return rows
 
 

@@ -64,7 +64,7 @@ def _held_out(scene: Scene, given: str, listed: str, settings: Settings) -> Scen
     return hold_out(scene, rule)
 
 
-def is_there(name: str) -> bool:
+def is_there(name: str | Path) -> bool:
     """Whether there is a file or folder of this name, which unlike that of Path.exists may be any text."""
     return os.path.exists(name)  # noqa: PTH110
 
@@ -75,7 +75,7 @@ def _entry(name: str, settings: Settings) -> SceneEntry | None:
         return settings.entry(name)
     entry = settings.entry(name)
     folder = settings.folder_of(entry) if entry else None
-    return entry if folder is not None and folder.exists() and folder.samefile(name) else None
+    return entry if folder is not None and is_there(folder) and folder.samefile(name) else None
 
 
 def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
@@ -92,11 +92,11 @@ def _folder(name: str, entry: SceneEntry | None, settings: Settings) -> Path:
             f"no folder and no scene of {settings.source} is called '{name}'{hint} (scenes: {', '.join(known)})"
         )
     folder = settings.folder_of(entry)
-    if folder is None or not folder.exists() or entry.render:
+    if folder is None or not is_there(folder) or entry.render:
         from .whereabouts import absence  # no source: it says what is missing
 
         said = absence([name], settings)
-        if said or folder is None or not folder.exists():
+        if said or folder is None or not is_there(folder):
             raise UserError(said or f"scene '{name}' is not in '{folder}'")
     return folder
 

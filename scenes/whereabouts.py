@@ -1,5 +1,6 @@
 """What to say of scenes that have a name and are not where they should be, with the line that brings them."""
 
+import os
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,7 +19,7 @@ def absence(names: Iterable[str], settings: Settings, study: bool = False) -> st
     known = {name: entry for name in names if name not in undrawn and (entry := settings.entry(name)) is not None}
     folders = {name: settings.folder_of(entry) for name, entry in known.items()}
     unset = [name for name, folder in folders.items() if folder is None]
-    absent = unset or [name for name, folder in folders.items() if folder is not None and not folder.exists()]
+    absent = unset or [name for name, folder in folders.items() if folder is not None and not os.path.exists(folder)]  # noqa: PTH110
     sentences = [_absent(absent, folders, bool(unset), known)] if absent else []
     sentences += [_undrawn(undrawn)] if undrawn and not (study and renders(settings)) else []
     return "; ".join(sentences) or None

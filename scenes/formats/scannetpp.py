@@ -8,7 +8,7 @@ import numpy as np
 
 from ...common.errors import UserError
 from ...common.files import read_json
-from ..image_files import leaves
+from ..image_files import is_file, leaves
 from ..types import OPENCV, Scene, Split
 from ._frames import natural, split
 from ._intrinsics import Intrinsics
@@ -90,7 +90,7 @@ def read(root: Path) -> Scene:
     notes = []
     images = _folder(folder, variant.images)
     assert images is not None
-    if held and not any((images / frame["file_path"]).is_file() for frame in held):
+    if held and not any(is_file(images / frame["file_path"]) for frame in held):
         notes.append(f"the {len(held)} test views are left out: the data set keeps their pictures to itself")
         held = []
     bad = sum(frame.get("is_bad") is True for frame in frames)

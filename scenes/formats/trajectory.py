@@ -1,5 +1,6 @@
 """A folder of images and a trajectory: poses as TUM or KITTI write them, matched by time or in order (--poses)."""
 
+import os
 import re
 from pathlib import Path
 
@@ -71,7 +72,8 @@ def read(root: Path, poses: Path | None = None, intrinsics: str = "", times: Pat
     if file is None:
         raise UserError(f"'{root}' has no single *.tum, {' or '.join(NAMES)}; name the trajectory by --poses FILE")
     if not is_file(file):
-        raise UserError(f"trajectory '{file}' is {'a folder' if file.is_dir() else 'missing'}; name a text file")
+        what = "a folder" if os.path.isdir(file) else "missing"  # noqa: PTH112
+        raise UserError(f"trajectory '{file}' is {what}; name a text file")
     rows, numbers = table(file, "trajectory")
     if rows.shape[1] not in COLUMNS:
         raise UserError(

@@ -87,9 +87,15 @@ def of_settings(root: Path) -> None:
 
 
 def opens_settings(given: Input) -> None:
+    from viewbench.scenes.load import _folder
+    from viewbench.scenes.whereabouts import absence
+
     settings = settings_file.load(given.root / given.changed[0])
     for name, entry in settings.scenes.items():
         settings.folder_of(entry)
+        absence([name], settings)
+        with contextlib.suppress(UserError):  # one that is not there
+            _folder(name, entry, settings)
         _ = settings.dataset_of(name, "x"), settings.room_of(name), settings.walk_of(name)
     if settings.compute.threads < 1 or settings.features.batch < 1 or settings.data.video_cache_gb < 1:
         raise InvalidError("numbers that mean nothing")

@@ -601,3 +601,34 @@ def test_a_line_of_times_that_has_commas_alone(tmp_path, at):
         assert "line 3" in refused(opened)
     else:
         assert opened().train.times is not None  # a heading
+
+
+def test_test_views_whose_names_no_file_system_takes(tmp_path):
+    _scenes.of_scannetpp("fisheye", tmp_path)
+    file = tmp_path / "dslr" / "nerfstudio" / "transforms.json"
+    table = json.loads(file.read_text())
+    for frame in table["test_frames"]:
+        frame["file_path"] = f"{'a' * 300}.JPG"
+    file.write_text(json.dumps(table))
+    lists = tmp_path / "dslr" / "train_test_lists.json"
+    lists.write_text(json.dumps({**json.loads(lists.read_text()), "test": [f"{'a' * 300}.JPG"]}))
+    assert not len(open_scene(str(tmp_path), _scenes.SETTINGS).test)
+
+
+@pytest.mark.parametrize("place", ["", "package:"])
+def test_settings_with_paths_that_no_file_system_takes(tmp_path, place):
+    from viewbench.scenes.whereabouts import absence
+
+    (tmp_path / "a.toml").write_text(f'[scenes.a]\npath = "{place}{"b" * 300}"\n[data]\nroot = "{tmp_path}"\n')
+    settings = settings_file.load(tmp_path / "a.toml")
+    assert "bbb" in (absence(["a"], settings) or "")
+    assert "bbb" in refused(open_scene, "a", settings)
+
+
+def test_a_trajectory_whose_name_no_file_system_takes(tmp_path):
+    _scenes.of_trajectory(tmp_path, True)
+
+    def opened():
+        return open_scene(str(tmp_path / "room0"), _scenes.SETTINGS, poses=str(tmp_path / ("b" * 300)))
+
+    assert "missing" in refused(opened)
