@@ -10,7 +10,7 @@ from typing import Any
 
 from ..common.errors import UserError
 from ..common.files import read_json
-from ._study_kinds import check_kinds
+from ._study_kinds import check_kinds, check_scene
 
 FULL = "full"  # the selector name of the full-data reference
 OK = "ok"
@@ -148,6 +148,7 @@ class Study:
         path = self.folder / "scenes" / f"{name}.json"
         record = read_json(path, "scene description")
         try:
+            check_scene(record)
             return SceneInfo(
                 name=name,
                 room=record.get("room") or name,

@@ -1,4 +1,4 @@
-"""Whether study.json has what reports take from it, of the kinds that `collect` writes."""
+"""Whether study.json and scenes/NAME.json have what reports take from them, of the kinds that viewbench writes."""
 
 from typing import Any
 
@@ -36,6 +36,30 @@ def check_kinds(record: Any) -> None:
             raise KeyError("grid")
         for key, kind in GRID.items():
             _check_list(grid.get(key, []), kind, "grid")
+
+
+def check_scene(record: Any) -> None:
+    """Raises KeyError, with its name, for a part that the description of a scene lacks or that is of another kind."""
+    if not isinstance(record, dict):
+        raise KeyError("everything")
+    for key in ("n_train", "n_test"):
+        if not isinstance(record[key], int):
+            raise KeyError(key)
+    for key in ("room", "walk"):
+        if not isinstance(record.get(key) or "", str):
+            raise KeyError(key)
+    for key, part in (("train", "positions"), ("train", "forward"), ("test", "positions")):
+        _check_rows(record[key][part], 3, part)
+    _check_rows(record["points"] or [], 6, "points")
+    _check_list(record.get("seen") or [], (int, float), "seen")
+
+
+def _check_rows(rows: Any, length: int, key: str) -> None:
+    _check_list(rows, list, key)
+    for row in rows:
+        _check_list(row, (int, float), key)
+        if len(row) != length:
+            raise KeyError(key)
 
 
 def _check_list(values: Any, kind: type | tuple[type, ...], key: str) -> None:

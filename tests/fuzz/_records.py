@@ -424,7 +424,8 @@ def opens_results(given: Input) -> None:
                 cell.read(name)
     _items.read(folder / "reports", "table-psnr")
     _page._tracking_words(folder)
-    _items.write(given.spare, "table-psnr", plugins.load("reports", "table-psnr").build(study, given.spare))
+    for name in ("table-psnr", "scenes", "over-rooms"):
+        _items.write(given.spare, name, plugins.load("reports", name).build(study, given.spare))
 
 
 def of_caches(root: Path) -> None:

@@ -552,6 +552,25 @@ STUDIES = [
 ]
 
 
+DESCRIPTIONS = [
+    *[("n_train", "4"), ("n_test", None), ("room", 3), ("walk", ["a"]), ("seen", {"a": 1}), ("seen", ["a"])],
+    *[("points", 3), ("points", [[1, 2]]), ("train", []), ("test", {"positions": [["a", 1, 2]]})],
+]
+
+
+@pytest.mark.parametrize(("key", "value"), DESCRIPTIONS)
+def test_descriptions_of_scenes_with_parts_of_other_kinds(tmp_path, key, value):
+    from tests.reports.fixtures import make_study
+    from viewbench.reports import _study as of_reports
+
+    folder = make_study(tmp_path / "study", scenes=("room_human",), selectors=("random",), ratios=(0.1,), seeds=(0,))
+    study = of_reports.load(folder)
+    record = json.loads((folder / "scenes" / "room_human.json").read_text())
+    assert study.scene("room_human").n_train == record["n_train"]
+    (folder / "scenes" / "room_human.json").write_text(json.dumps({**record, key: value}))
+    assert "room_human.json" in refused(study.scene, "room_human")
+
+
 @pytest.mark.parametrize(("key", "value"), STUDIES)
 def test_descriptions_of_studies_with_parts_of_other_kinds(tmp_path, key, value):
     from tests.reports.fixtures import make_study
