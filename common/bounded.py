@@ -56,7 +56,7 @@ def json_text(path: str | os.PathLike, what: str) -> str:
             "values; split the capture"
         )
     try:
-        return content.decode("utf-8")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise UserError(f"{what} '{path}' is not UTF-8 text; it should be a JSON file") from None
 

@@ -12,6 +12,7 @@ from .errors import UserError, nearest
 PACKAGE = Path(__file__).resolve().parent.parent
 ROOMS_PACKAGE = "viewbench_rooms"  # the rendered rooms as a package of their own, since they are 60 MB
 FILE = "environment.toml"
+NAMED = "VIEWBENCH_ENVIRONMENT"  # the variable that names another file
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,7 @@ def at_home(path: str) -> Path:
 
 def find() -> Path:
     """The file in force: VIEWBENCH_ENVIRONMENT, `environment.toml` here, or the one that viewbench ships."""
-    named = os.environ.get("VIEWBENCH_ENVIRONMENT")
+    named = os.environ.get(NAMED)
     if named:
         return Path(named)
     return Path(FILE) if Path(FILE).is_file() else PACKAGE / FILE

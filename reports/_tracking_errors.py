@@ -4,7 +4,7 @@ import os
 import re
 from enum import Enum
 from typing import Any
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
 from ..common.errors import UserError
 
@@ -34,13 +34,11 @@ class Kind(Enum):
 
 def masked(text: str, uri: str = "") -> str:
     """The text without user names and passwords in addresses and without the secrets that MLflow is given."""
-    text = re.sub(r"(?<=://)[^/\s'\"]*@", "***@", text)
+    text = re.sub(r"(?<=://)[^\s'\"]*@", "***@", text)  # a password of a database may have "/" and "@" in it
     secrets = {os.environ.get(name, "") for name in SECRETS}
-    try:
-        password = urlsplit(uri).password or ""
-    except ValueError:
-        password = ""
-    for secret in sorted(secrets | {password, unquote(password)}, key=len, reverse=True):
+    for password in re.findall(r"://[^:/\s]*:([^\s'\"]*)@", uri):
+        secrets |= {password, unquote(password)}
+    for secret in sorted(secrets, key=len, reverse=True):
         if len(secret) >= SHORTEST:
             text = text.replace(secret, "***")
     return text

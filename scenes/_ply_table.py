@@ -37,6 +37,10 @@ def vertices(path: Path, most: int = limits.POINTS) -> np.ndarray:
         for element in elements:
             if element.name == "vertex":
                 return _vertices(file, order, element, skipped, size, most)
+            if order == "=" and element.count <= limits.LINES:
+                for _ in range(element.count):  # one line each
+                    file.readline(limits.LINE_LETTERS)
+                continue
             if order == "=" or any(not kind for _, kind in element.properties):
                 raise ValueError(f"its element '{element.name[:40]}' comes before the vertices; write these first")
             skipped += element.count * np.dtype(element.properties).itemsize

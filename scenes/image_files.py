@@ -3,7 +3,9 @@
 import contextlib
 import functools
 import os
+import re
 import struct
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -17,7 +19,12 @@ BEGINNINGS = (
     *(b"\x89PNG", b"\xff\xd8\xff", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"BM", b"GIF8", b"RIFF", b"\0\0\0\x0cjP"),
     *(b"\xff\x4f\xff\x51", *(b"P%d" % kind for kind in range(1, 8)), b"PF", b"Pf", b"\x93NUMPY", b"v/1\x01", b"#?"),
 )
+COLMAP_DEPTH = re.compile(rb"\d+&\d+&\d+&")  # width, height and channels of its dense depth maps
+HEIF_BRANDS = (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1")  # ISO/IEC 23008-12
+AVIF_BRANDS = (b"avif", b"avis")
 HEIC = {".heic", ".heif", ".hif"}  # as iPhones and some cameras write them; PIL reads them with pillow-heif
+# Of JPEG: what is no byte of the picture's data, in which 0xFF is followed by zero or the number of a restart.
+MARKER, START_OF_SCAN, END_OF_IMAGE = re.compile(rb"\xff[^\x00\x01\xd0-\xd7\xff]"), 0xDA, 0xD9
 # Those that are opened, whatever the file is called. PIL knows forty more; for one of them, EPS, it runs Ghostscript.
 FORMATS = ("JPEG", "PNG", "BMP", "GIF", "PPM", "TIFF", "WEBP", "JPEG2000")
 
@@ -52,19 +59,9 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
     _bounded_pillow()
     hush_pillow()
     formats = FORMATS
-
-    if path.suffix.lower() in HEIC:
-        from ..common import extras  # no source: it says what to install
-
-        extras.need("pillow_heif")
-        import pillow_heif  # pyright: ignore[reportMissingImports]: an extra
-
-        pillow_heif.register_heif_opener()
-        formats = (*FORMATS, "HEIF")
-    elif path.suffix.lower() == ".avif":
-        formats = (*FORMATS, "AVIF")
     try:
         bounded.checked(path, limits.IMAGE_BYTES)
+        formats = _formats(path)
         with Image.open(path, formats=formats) as image:
             if max(image.size) > limits.SIDE:
                 raise OSError(f"it is {image.size[0]} x {image.size[1]}; sides of up to {limits.SIDE:,} are read")
@@ -90,6 +87,25 @@ def open_image(path: Path, head: bool = False) -> Iterator[Any]:
         raise UserError(f"image '{path}' cannot be read: it is damaged ({error})") from None
 
 
+def _formats(path: Path) -> tuple[str, ...]:
+    """The formats that the file may be in: those that need a library or have no mark of their own only where it says
+    so, by its first bytes or its name. Raises UserError where the library is not installed."""
+    with open(path, "rb") as file:
+        head = file.read(12)
+    brand = head[8:12] if head[4:8] == b"ftyp" else b""
+    if brand in HEIF_BRANDS or path.suffix.lower() in HEIC:
+        from ..common import extras  # no source: it says what to install
+
+        extras.need("pillow_heif")
+        import pillow_heif  # pyright: ignore[reportMissingImports]: an extra
+
+        pillow_heif.register_heif_opener()
+        return (*FORMATS, "HEIF")
+    if brand in AVIF_BRANDS or path.suffix.lower() == ".avif":
+        return (*FORMATS, "AVIF")
+    return (*FORMATS, "TGA") if path.suffix.lower() == ".tga" else FORMATS
+
+
 def _of_pillow(error: Exception) -> bool:
     """Whether it was raised in PIL's own code, which a damaged file makes stumble in any way."""
     at = error.__traceback__
@@ -101,9 +117,15 @@ def _of_pillow(error: Exception) -> bool:
 def _check_scans(path: Path) -> None:
     """Raises OSError for a JPEG that is drawn over more often than limits.SCANS."""
     content = bounded.data(path, "image", limits.IMAGE_BYTES)
-    scans = content.count(b"\xff\xda")  # in a picture's data 0xFF is followed by zero
-    if scans > limits.SCANS:
-        raise OSError(f"it is drawn in {scans:,} scans, at most {limits.SCANS} are read")
+    scans, at = 0, 2
+    while found := MARKER.search(content, at):  # up to the end of the picture: a phone may append a video
+        marker, at = content[found.end() - 1], found.end()
+        if marker == END_OF_IMAGE:
+            break
+        scans += marker == START_OF_SCAN
+        at += int.from_bytes(content[at : at + 2], "big")  # the length of a segment counts itself
+        if scans > limits.SCANS:
+            raise OSError(f"it is drawn in more than {limits.SCANS} scans, which is all that are read")
 
 
 def image_size(path: Path) -> tuple[int, int]:
@@ -121,18 +143,33 @@ def check_whole(path: Path) -> None:
 
 
 def check_picture(path: Path) -> None:
-    """Raises UserError for a file that does not begin as a picture, a mask or a depth image does.
+    """Raises UserError for a file behind a link that does not begin as a picture, a mask or a depth image does.
 
     What goes into a subset may be a link of the capture to anything: to a key, say, that would be copied.
     """
+    if not bounded.linked(path):
+        return
     try:
         bounded.checked(path)
         with open(path, "rb") as file:
             head = file.read(16)
     except OSError as error:
         raise UserError(f"image '{path}' cannot be read: {error.strerror}") from None
-    if not head.startswith(BEGINNINGS) and head[4:8] != b"ftyp":
-        raise UserError(f"'{path}' is no picture and no depth image; take it out of the capture")
+    if head.startswith(BEGINNINGS) or head[4:8] == b"ftyp" or COLMAP_DEPTH.match(head) or _is_npz(path, head):
+        return
+    if path.suffix.lower() == ".tga":
+        image_size(path)
+        return
+    raise UserError(f"'{path}' leads to what is no picture and no depth image; take it out of the capture")
+
+
+def _is_npz(path: Path, head: bytes) -> bool:
+    """Whether it is an archive of arrays and nothing else."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return head.startswith(b"PK") and all(name.endswith(".npy") for name in archive.namelist())
+    except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError):
+        return False
 
 
 def leaves(name: str) -> bool:

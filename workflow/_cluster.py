@@ -40,6 +40,7 @@ def inside(workflow: Any) -> None:
     """In a process that the scheduler has started for a job or a group: to be called when its jobs are looked up, since
     these settings are not there yet when the workflow is read."""
     workflow.execution_settings.keep_going = True
+    os.environ["VIEWBENCH_COMPUTE_RETRIES"] = "0"  # the scheduler's next attempt has more memory, and time of its own
     if workflow.execution_settings.attempt > 1:
         # Snakemake has such a process make all jobs of its group, whatever is there. (Where another release keeps that
         # elsewhere, all are made again.)

@@ -147,6 +147,9 @@ def run(request: dict[str, Any], fds: list[int]) -> NoReturn:
         for number, fd in enumerate(fds):
             os.dup2(fd, number)
         os.closerange(3, max(fds, default=3) + 100)
+        # Those that Python made when the server began know another file, whether it was a terminal and could be wound.
+        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+        sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1, closefd=False)  # noqa: SIM115
         os.chdir(request["folder"])
         os.environ.clear()
         os.environ.update(request["environment"])

@@ -55,6 +55,9 @@ def run(arguments: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, _stop)  # so that temporary files are removed on the way out
     if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) == signal.SIG_DFL:  # and not under nohup
         signal.signal(signal.SIGHUP, _stop)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by who called
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
     if not sys.warnoptions:  # of libraries, about what a file holds: what matters of it is said in a sentence
         for kind in (RuntimeWarning, UserWarning):
             warnings.simplefilter("ignore", kind)

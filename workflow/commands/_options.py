@@ -1,6 +1,7 @@
 """Options that several commands share, and the way they show progress."""
 
 import functools
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -97,18 +98,18 @@ class Capture:
 
     def _check_settings(self, settings: "Settings") -> None:
         """Raises UserError where the settings of the current folder are part of the capture: whoever made that could
-        name programs in them that are run, and folders that are written to."""
-        from ...common.settings import FILE
+        name programs in them that are run, and folders that are written to. A single file brings none along."""
+        from ...common.settings import FILE, NAMED, PACKAGE
         from ...scenes.load import is_there
 
-        if str(settings.source) != FILE or not is_there(self.name):
+        named = os.environ.get(NAMED) or str(settings.source) != FILE
+        if named or not is_there(self.name) or Path(FILE).resolve() == PACKAGE / FILE:
             return
         folder = Path(self.name)
-        folder = (folder if folder.is_dir() else folder.parent).resolve()
-        if Path.cwd().resolve().is_relative_to(folder):
+        if folder.is_dir() and Path.cwd().resolve().is_relative_to(folder.resolve()):
             raise UserError(
                 f"'{FILE}' in the current folder lies in the capture and may have come with it; call viewbench from "
-                f"another folder, or set VIEWBENCH_ENVIRONMENT={FILE} if it is yours"
+                f"another folder, or set {NAMED}={FILE} if it is yours"
             )
 
 
