@@ -69,7 +69,7 @@ def reaches(record: dict[str, Any]) -> bool:
 
 def read(handle: int) -> dict[str, Any]:
     """The record in an open file; empty where there is none, or one that was cut short."""
-    with contextlib.suppress(OSError, ValueError):
+    with contextlib.suppress(OSError, RecursionError, ValueError):
         record = json.loads(os.pread(handle, 4096, 0))
         return record if isinstance(record, dict) else {}
     return {}

@@ -150,7 +150,7 @@ def _allowed(results: Path, handle: int, unlock: bool) -> None:
 def _lives(pid: Any) -> bool:
     try:
         os.kill(int(pid), 0)
-    except (ProcessLookupError, TypeError, ValueError):
+    except (OverflowError, ProcessLookupError, TypeError, ValueError):
         return False
     except PermissionError:
         return True

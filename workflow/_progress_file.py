@@ -15,6 +15,7 @@ from ..common.files import read_json, write_json
 FILE = "progress.json"
 EVERY_S = 2.0  # between two writings where something happens
 SILENT_S = 20.0  # and where nothing does
+LATEST_S = 1e11  # a time that people can be told of: the year 5138
 GONE_S = 120.0  # a run on another machine that has been silent for so long is gone
 
 
@@ -131,7 +132,7 @@ def read(folder: Path) -> Run | None:
                 Job(
                     str(job["rule"]),
                     {str(name): str(value) for name, value in job["wildcards"].items()},
-                    float(job["since"]),
+                    _seconds(job["since"]),
                     str(job.get("words", "")),
                     str(job.get("log", "")),
                 )
@@ -143,17 +144,24 @@ def read(folder: Path) -> Run | None:
         return Run(
             pid=int(record["pid"]),
             host=str(record["host"]),
-            began=float(record["began"]),
-            said=float(record["said"]),
+            began=_seconds(record["began"]),
+            said=_seconds(record["said"]),
             ended=str(record["ended"]),
-            seconds_left=None if left is None else float(left),
+            seconds_left=None if left is None else _seconds(left),
             doing=str(record["doing"]),
             boot=str(record["boot"]),
             started=str(record["started"]),
             **jobs,
         )
-    except (UserError, KeyError, TypeError, ValueError, AttributeError):
+    except (UserError, ArithmeticError, AttributeError, KeyError, TypeError, ValueError):
         return None
+
+
+def _seconds(value: Any) -> float:
+    """A time, or a span of it. Raises ValueError for what is none."""
+    if not abs(float(value)) <= LATEST_S:
+        raise ValueError("no time")
+    return float(value)
 
 
 def _boot() -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from tests.fuzz import _files
 from tests.fuzz._reader import Input, InvalidError, Reader
 from tests.fuzz._scenes import SETTINGS, room
-from viewbench.common import catalogue
+from viewbench.common import catalogue, holding
 from viewbench.common import settings as settings_file
 from viewbench.common.errors import UserError
 from viewbench.common.files import plain, sealed, sha256_file, write_json
@@ -495,6 +495,38 @@ def opens_digests(given: Input) -> None:
             raise InvalidError("a hash that is none")
 
 
+def of_progress(root: Path) -> None:
+    from types import SimpleNamespace
+
+    from viewbench.workflow import _progress_file
+
+    at_it = SimpleNamespace(rule="train", wildcards={key: str(value) for key, value in CELL.items()}, began=1.0)
+    file = _progress_file.RunFile(root)
+    file.fail("a.json", "select", {"scene": "small", "selector": "uniform", "part": "0.5", "seed": "0"}, "why", "a.log")
+    file.write(SimpleNamespace(clock=lambda: 2.0, running={"a": at_it}), 60.0, "1 of 2", at_once=True)
+    with open(root / "held.json", "wb") as held:
+        holding.write(held.fileno(), holding.me())
+
+
+def opens_progress(given: Input) -> None:
+    """What `status` and a second run make of the files that a run leaves."""
+    from viewbench.workflow import _alone, _progress_file, _standing
+    from viewbench.workflow.commands import status
+
+    with open(given.root / "held.json", "rb") as held:
+        record = holding.read(held.fileno())
+    _ = holding.reaches(record), holding.named(record), _alone._lives(record.get("pid"))
+    run = _progress_file.read(given.root)
+    asked = _asked()
+    cells = _standing.standing(asked.study, given.root, SETTINGS, run)
+    counts = _standing.counts(cells)
+    _standing.beside(asked.study, run)
+    status._lines(asked.study, "one", run, cells, counts, None)
+    json.dumps(status._record(asked.study, run, cells, counts, status._left(run)), allow_nan=False)
+    if run is None:
+        raise UserError("nothing is known of a run")
+
+
 READERS = (
     Reader("selection", of_selection, opens_selection, whole=True),
     Reader("settings", of_settings, opens_settings, whole=True),
@@ -506,6 +538,7 @@ READERS = (
     Reader("render", of_render, opens_render),
     Reader("model", of_model, opens_model, package="numba"),
     Reader("cell", of_cell, opens_cell, package="jsonschema"),
+    Reader("progress", of_progress, opens_progress, package="jsonschema", whole=True),
     Reader("results", of_results, opens_results, package="matplotlib"),
     Reader("video-cache", of_caches, opens_caches, package="av"),
     Reader("digests", of_digests, opens_digests, whole=True),

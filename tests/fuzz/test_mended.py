@@ -651,3 +651,29 @@ def test_a_trajectory_whose_name_no_file_system_takes(tmp_path):
         return open_scene(str(tmp_path / "room0"), _scenes.SETTINGS, poses=str(tmp_path / ("b" * 300)))
 
     assert "missing" in refused(opened)
+
+
+@pytest.mark.parametrize("value", [1e300, 10**400, float("nan"), float("inf"), "x", None])
+@pytest.mark.parametrize("key", ["began", "said", "pid", "running"])
+def test_times_and_processes_of_runs_that_are_none(tmp_path, key, value):
+    pytest.importorskip("jsonschema")
+    from viewbench.workflow import _progress_file
+
+    _records.of_progress(tmp_path)
+    file = tmp_path / _progress_file.FILE
+    record = json.loads(file.read_text())
+    assert _progress_file.read(tmp_path) is not None
+    record[key] = [{**record["running"][0], "since": value}] if key == "running" else value
+    file.write_text(json.dumps(record))
+    run = _progress_file.read(tmp_path)
+    assert run is None or (key == "pid" and not run.alive)
+
+
+@pytest.mark.parametrize("content", [b"[" * 4000, b'{"pid": 1' + b"0" * 40 + b"}", b'{"pid": Infinity}'])
+def test_files_of_a_run_that_no_run_wrote(tmp_path, content):
+    from viewbench.common import holding
+    from viewbench.workflow import _alone
+
+    (tmp_path / "held.json").write_bytes(content)
+    with open(tmp_path / "held.json", "rb") as held:
+        assert not _alone._lives(holding.read(held.fileno()).get("pid"))

@@ -30,6 +30,7 @@ def command(context: click.Context, study: str, results: Path, everything: bool,
     status: 0 when all cells are done, 1 when something failed, 3 when some are still to be done and none failed.
     """
     from ...common import settings as settings_file
+    from ...common.errors import printable
     from .. import _progress_file, _standing, _study
 
     settings = settings_file.load()
@@ -45,7 +46,7 @@ def command(context: click.Context, study: str, results: Path, everything: bool,
     else:
         lines = _lines(checked, study, run, cells, counts, None if everything else SHOWN)
         lines += [f"failed: {job.rule}: {job.words or 'it left no word'} ({job.log})" for job in others]
-        click.echo("\n".join(lines))
+        click.echo("\n".join(map(printable, lines)))
     unfinished = len(cells) - counts["done"]
     context.exit(FAILED if counts["failed"] or others else UNFINISHED if unfinished else DONE)
 
