@@ -121,13 +121,18 @@ def _open(study: str, tracking: Tracking, retries: int, wait_s: float) -> Log:
     os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")
     os.environ.setdefault("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT", "true")
     uri = local_uri(tracking.uri)
-    if path := _tracking_sqlite.path_of(uri):
+    path = _tracking_sqlite.path_of(uri)
+    if path:
         _tracking_sqlite.check(path, wait_s)
     from mlflow import MlflowClient
 
     for name in QUIET:
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    return Log(MlflowClient(tracking_uri=uri), uri, study, tracking)
+    with _tracking_sqlite.alone_at_first(path, wait_s) if path else contextlib.nullcontext():
+        client = MlflowClient(tracking_uri=uri)
+        if path:
+            client.search_experiments(max_results=1)  # makes the database, if the client has not
+    return Log(client, uri, study, tracking)
 
 
 @contextlib.contextmanager

@@ -51,10 +51,11 @@ class TroubledError(Exception):
 def errors() -> tuple[type[BaseException], ...]:
     """What MLflow raises for what it meets: its own, requests' and files' (OSError), for answers that are not JSON
     (ValueError), and where the driver of a database is not installed."""
+    from alembic.util import CommandError
     from mlflow.exceptions import MlflowException
     from sqlalchemy.exc import SQLAlchemyError
 
-    return MlflowException, SQLAlchemyError, OSError, ValueError, ImportError, TroubledError
+    return MlflowException, SQLAlchemyError, CommandError, OSError, ValueError, ImportError, TroubledError
 
 
 def kind(error: BaseException) -> Kind:

@@ -1,12 +1,17 @@
 """Whether MLflow can write to a file of SQLite, found out before MLflow tries to, which may take it minutes."""
 
 import contextlib
+import os
 import sqlite3
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
+from ..common import holding
 from ..common.errors import UserError
 
 PREFIX = "sqlite:///"
+POLL_S = 0.2
 
 
 def path_of(uri: str) -> Path | None:
@@ -36,6 +41,32 @@ def check(path: Path, wait_s: float) -> None:
         raise UserError(f"{path} {_words(str(error), wait_s)}") from None
     if made_by:
         _check_version(path, str(made_by[0][0]))
+
+
+@contextlib.contextmanager
+def alone_at_first(path: Path, wait_s: float) -> Iterator[None]:
+    """While the body has MLflow make a database that is not there, no other process of ours does.
+
+    MLflow's own making of one fails where two are at it. Waits up to `wait_s` seconds for another.
+    """
+    if path.exists() and path.stat().st_size and _is_made(path):
+        yield
+        return
+    # flock, which SQLite's own locks (fcntl) know nothing of, on the file itself: empty, it is new to MLflow.
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        until = time.monotonic() + wait_s
+        while holding.lock(handle) is False and time.monotonic() < until:
+            time.sleep(POLL_S)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _is_made(path: Path) -> bool:
+    with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(path)) as database:
+        return _made({name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")})
+    return False
 
 
 def _made(tables: set[str]) -> bool:

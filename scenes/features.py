@@ -111,8 +111,10 @@ def altered(content: bytes) -> bool:
     """Whether the content of a file that `save` wrote is not what it wrote; files of others have no hash, and are
     taken as they are."""
     start = len(content) - hashlib.sha256().digest_size
-    bare, mark = content[: start - len(MARK)], content[start - len(MARK) : start]
-    return start > len(MARK) and mark == MARK and hashlib.sha256(bare).digest() != content[start:]
+    bare = start - len(MARK)
+    if bare <= 0 or content[bare:start] != MARK:
+        return False
+    return hashlib.sha256(memoryview(content)[:bare]).digest() != content[start:]
 
 
 def load_user_features(path: Path, n: int) -> np.ndarray:

@@ -93,12 +93,12 @@ def claim(results: Path, arguments: list[str]) -> bool:
     return True
 
 
-def refused(results: Path) -> None:
+def refused(results: Path, unlock: bool = False) -> None:
     """Raises UserError where `claim` would; holds nothing."""
     with contextlib.suppress(FileNotFoundError), _said(results):
         handle = os.open(results / FILE, os.O_RDWR)
         try:
-            _allowed(results, handle, unlock=False)
+            _allowed(results, handle, unlock)
         finally:
             os.close(handle)
 
@@ -143,7 +143,8 @@ def _allowed(results: Path, handle: int, unlock: bool) -> None:
         sign = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(os.fstat(handle).st_mtime))
         raise UserError(
             f"'{results}' is, or was, run by {holding.named(record)}, a machine that cannot be asked from here (its "
-            f"last sign of life: {sign}); if nothing runs there any more, give the same command with --unlock once"
+            f"last sign of life: {sign}); if nothing runs there any more, give the same command with --unlock once "
+            "(viewbench run: behind --)"
         )
 
 

@@ -10,11 +10,11 @@ from ..common.errors import UserError
 from ..common.files import read_json, sha256_file, whole, write_text
 from ..common.settings import Settings
 from ..reports._study import NOT_RUN
+from ._progress import STOPPED
 from ._stale import Asked
 from ._study import Study
 
 TABLE_SEAL = ".results.csv.sha256"  # the hash of results.csv as it was written
-STOPPED = ("viewbench: stopped", "viewbench: the process that ran this is gone")
 COLUMNS = (
     "study",
     "dataset",

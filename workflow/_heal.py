@@ -111,6 +111,13 @@ def _whole_renders(folder: Path, read: bool) -> bool:
     return False
 
 
+def damage(folder: Path) -> str:
+    """What is missing of a scored cell's files, or has another length, in words; "" where nothing is."""
+    if not _whole_model(folder, read=False):
+        return "files of the model are missing or cut short"
+    return "" if _whole_renders(folder, read=False) else "renders are missing or cut short"
+
+
 def _has(path: Path, size: int | None) -> bool:
     return path.stat().st_size == size if size is not None else path.is_file()
 

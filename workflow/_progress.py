@@ -23,6 +23,8 @@ TICK_S = 1.0  # between two drawings on a terminal
 LITTLE = 1 << 20  # bytes of free space in which no job can be done
 LINE_S = 20.0  # between two lines elsewhere
 BAR = 20  # characters
+# Last words of jobs that ended with their run, and did not fail.
+STOPPED = ("viewbench: stopped", "viewbench: the process that ran this is gone")
 
 
 class Progress(logging.Handler):
@@ -123,7 +125,7 @@ class Progress(logging.Handler):
         logs = list(getattr(record, "log", []) or [])
         words = said_by_scheduler(logs) or last_line([log for log in logs if ".snakemake" not in str(log)])
         output = ", ".join(files)
-        if made or output in self.failures:
+        if made or output in self.failures or words in STOPPED:
             return
         self.failures.add(output)
         if self.file:

@@ -9,6 +9,7 @@ from ..common.cells import cell_folder, cell_name
 from ..common.errors import UserError
 from ..common.files import read_json
 from ..common.settings import Settings
+from ._heal import damage
 from ._progress_file import Job, Run
 from ._stale import Asked
 from ._study import Study
@@ -33,7 +34,8 @@ def standing(study: Study, results: Path, settings: Settings, run: Run | None) -
     """Every cell of the study, in the order of the grid; `results` is results/STUDY.
 
     A cell is done when its files fit together and to what the study, the settings, the data and the code are now, as
-    `collect` would have it; "stale" when they do not, and nothing is at it.
+    `collect` would have it, and model and renders are there and as long as they were; "stale" when not, and nothing is
+    at it.
     """
     asked = Asked(study, results, settings)
     running = run.running if run is not None and run.alive else ()
@@ -78,6 +80,9 @@ def _of(
         try:
             records: list[Any] = [read_json(folder / f"{step}.json", step) for step in FILES]
             asked.check(cell, folder, *records)
+            damaged = damage(folder)
+            if damaged and lost is None:
+                return Standing(name, "stale", damaged)
             return Standing(name, "done", seconds=records[1]["seconds"] + records[2]["seconds"])
         except UserError as error:
             if lost is None:

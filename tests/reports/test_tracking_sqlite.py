@@ -3,6 +3,8 @@ import os
 import shutil
 import sqlite3
 import stat
+import subprocess
+import sys
 import tempfile
 import threading
 from pathlib import Path
@@ -101,3 +103,23 @@ def test_a_folder_and_an_address_that_is_none_are_named(store):
         _tracking.track("demo", ROWS, results, Tracking(uri=f"sqlite:///{path.parent}"))
     with pytest.raises(UserError, match=r"127\.0\.0\.1:5000"):
         _tracking.track("demo", ROWS, results, Tracking(uri="127.0.0.1:5000://", patience=0))
+
+
+def test_two_that_make_a_database_at_once(tmp_path):
+    """As two studies do that end together in a new folder: MLflow's own making of a database fails then."""
+    code = (
+        "import sys; from pathlib import Path; from viewbench.common.settings import Tracking\n"
+        "from viewbench.reports import _tracking\n"
+        "folder = Path(sys.argv[1])\n"
+        "tracking = Tracking(f'sqlite:///{folder}/mlflow.db', str(folder / 'a'), patience=100)\n"
+        "_tracking.track(sys.argv[2], [], folder / sys.argv[2], tracking)"
+    )
+    jobs = [
+        subprocess.Popen([sys.executable, "-c", code, str(tmp_path), name], stderr=subprocess.PIPE, text=True)
+        for name in ("one", "two")
+    ]
+    said = [job.communicate(timeout=240)[1] for job in jobs]
+    assert [job.returncode for job in jobs] == [0, 0], said
+    with contextlib.closing(sqlite3.connect(tmp_path / "mlflow.db")) as database:
+        names = {name for (name,) in database.execute("SELECT name FROM experiments")}
+    assert {"one", "two"} <= names

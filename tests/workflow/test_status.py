@@ -1,7 +1,10 @@
 """`viewbench status`: while a study runs, when it was killed, when cells have failed, and when all are done."""
 
+import functools
 import json
 import os
+import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -85,6 +88,18 @@ def said(clone: Clone) -> str:
     return clone.call("viewbench", "status", "mini").stdout
 
 
+def begun(clone: Clone) -> subprocess.Popen:
+    """The study, in a process group of its own, with SIGINT as a terminal's programs have it."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "snakemake", "-j2", "--config", "study=mini", "--", "reports"],
+        cwd=clone.folder,
+        env=clone.environment(),
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        preexec_fn=functools.partial(signal.signal, signal.SIGINT, signal.default_int_handler),
+    )
+
+
 def until(condition: Callable[[], bool]) -> None:
     for _ in range(900):
         if condition():
@@ -102,10 +117,7 @@ def test_the_life_of_a_study(clone):
 
     for name in ("slow", "cross"):
         (place / name).touch()
-    command = [sys.executable, "-m", "snakemake", "-j2", "--config", "study=mini", "--", "reports"]
-    run = subprocess.Popen(
-        command, cwd=clone.folder, env=clone.environment(), stderr=subprocess.DEVNULL, start_new_session=True
-    )
+    run = begun(clone)
     try:
         until(lambda: status(clone)[1]["counts"]["running"] > 0 and (place / "training").exists())
         code, found = status(clone)
@@ -121,9 +133,18 @@ def test_the_life_of_a_study(clone):
     assert "the last run was killed" in said(clone)
     assert sum(found["counts"].values()) == 6
 
+    (place / "training").unlink()
+    run = begun(clone)
+    try:
+        until((place / "training").exists)
+    finally:
+        os.killpg(run.pid, signal.SIGINT)
+        run.wait()
+    code, found = status(clone)
+    assert (code, found["counts"]["failed"], found["run"]["ended"]) == (3, 0, "stopped"), found
+    assert "the last run was stopped" in said(clone)
+
     (place / "slow").unlink()
-    unlock = [sys.executable, "-m", "snakemake", "--unlock", "--config", "study=mini"]
-    subprocess.run(unlock, cwd=clone.folder, env=clone.environment(), capture_output=True, check=False)
     assert clone.snakemake().returncode != 0
     code, found = status(clone)
     assert (code, found["counts"]) == (1, {"done": 4, "running": 0, "failed": 2, "stale": 0, "to come": 0})
@@ -137,6 +158,15 @@ def test_the_life_of_a_study(clone):
     code, found = status(clone)
     assert (code, found["counts"]["done"], found["run"]["ended"]) == (0, 6, "finished")
     assert said(clone) == "mini: 6 of 6 cells done\n"
+
+    cell = clone.results / "cells" / "splat" / "walk" / "uniform" / "0.2" / "0"
+    for file, words in {"model.ply": "files of the model are", "renders": "renders are"}.items():
+        shutil.move(cell / file, place / "aside")
+        code, found = status(clone)
+        assert (code, found["counts"]["stale"]) == (3, 1)
+        assert f"stale: splat/walk/uniform/0.2/0: {words} missing or cut short\n" in said(clone)
+        shutil.move(place / "aside", cell / file)
+    assert status(clone)[0] == 0
 
     clone.edit("selectors/uniform.py")
     code, found = status(clone)

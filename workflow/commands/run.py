@@ -57,7 +57,7 @@ def command(
     name, absent = loaded.name, absence(loaded.scenes, settings, study=True)
     if absent:
         raise UserError(absent)
-    _alone.refused(out / "results" / name)
+    _alone.refused(out / "results" / name, unlock="--unlock" in options)
     out.mkdir(parents=True, exist_ok=True)
     status = _wait(subprocess.Popen(arguments(study, out, jobs, options, verify), env=environment(settings)))
     page = out / "results" / name / "reports" / "index.html"
