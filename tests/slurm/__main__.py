@@ -55,6 +55,7 @@ def main() -> int:
             return 1
         install(packages)
     folder = given.keep or Path(tempfile.mkdtemp(prefix="viewbench-slurm-", dir="/tmp"))
+    folder.chmod(0o755)  # munge refuses a socket that others do not get to
     try:
         return attempt(folder)
     finally:
