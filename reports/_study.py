@@ -10,7 +10,7 @@ from typing import Any
 
 from ..common.errors import UserError
 from ..common.files import read_json
-from ._study_kinds import check_kinds, check_scene
+from ._study_kinds import check_kinds, check_record, check_scene
 
 FULL = "full"  # the selector name of the full-data reference
 OK = "ok"
@@ -48,7 +48,13 @@ class Cell:
 
     def read(self, name: str) -> dict[str, Any]:
         """The cell's "selection", "train" or "metrics" file; raises UserError when it is missing or broken."""
-        return read_json(self.folder / f"{name}.json", name)
+        path = self.folder / f"{name}.json"
+        record = read_json(path, name)
+        try:
+            check_record(name, record)
+        except KeyError as error:
+            raise UserError(f"{name} '{path}' has no {error} as viewbench writes it; run the study again") from None
+        return record
 
 
 @dataclass(frozen=True)

@@ -677,3 +677,21 @@ def test_files_of_a_run_that_no_run_wrote(tmp_path, content):
     (tmp_path / "held.json").write_bytes(content)
     with open(tmp_path / "held.json", "rb") as held:
         assert not _alone._lives(holding.read(held.fileno()).get("pid"))
+
+
+RECORDS = [
+    *[("selection", "indices", ["a"]), ("selection", "indices", 3), ("train", "curve", 0.5), ("train", "curve", [3])],
+    *[("train", "curve", [{"step": {}}]), ("train", "gpu", "a"), ("metrics", "views", [{"name": "a"}])],
+]
+
+
+@pytest.mark.parametrize(("name", "key", "value"), RECORDS)
+def test_records_of_cells_that_reports_cannot_use(tmp_path, name, key, value):
+    from tests.reports.fixtures import make_study
+    from viewbench.reports import _study as of_reports
+
+    folder = make_study(tmp_path / "study", scenes=("room_human",), selectors=("random",), ratios=(0.1,), seeds=(0,))
+    cell = of_reports.load(folder).done[0]
+    record = cell.read(name)
+    (cell.folder / f"{name}.json").write_text(json.dumps({**record, key: value}))
+    assert key in refused(cell.read, name)
