@@ -695,3 +695,16 @@ def test_records_of_cells_that_reports_cannot_use(tmp_path, name, key, value):
     record = cell.read(name)
     (cell.folder / f"{name}.json").write_text(json.dumps({**record, key: value}))
     assert key in refused(cell.read, name)
+
+
+def test_a_point_too_far_away_for_the_files_of_others(tmp_path):
+    from viewbench.scenes.ply import read_points, write_points
+
+    points = _scenes.room(tmp_path / "room").points
+    assert points is not None
+    write_points(tmp_path / "a.ply", points)
+    far = points.xyz.copy()
+    far[3, 1] = -1e39
+    assert "point 3" in refused(write_points, tmp_path / "b.ply", replace(points, xyz=far))
+    assert len(read_points(tmp_path / "a.ply")) == len(points)
+    assert not (tmp_path / "b.ply").exists()
