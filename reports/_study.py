@@ -14,6 +14,7 @@ from ._study_kinds import check_kinds, check_record, check_scene
 
 FULL = "full"  # the selector name of the full-data reference
 OK = "ok"
+LARGEST = 1e100  # of a figure: its square is a number, too
 NOT_RUN = "not run yet"  # the study was stopped before it came to the cell
 
 
@@ -288,6 +289,8 @@ def _cell(row: dict[str, str], folder: Path) -> Cell:
 
 def _number(text: str) -> float | None:
     value = float(text) if text else math.nan
+    if LARGEST < abs(value) < math.inf:
+        raise ValueError(f"{text[:40]} is no figure")
     return value if math.isfinite(value) else None
 
 

@@ -708,3 +708,11 @@ def test_a_point_too_far_away_for_the_files_of_others(tmp_path):
     assert "point 3" in refused(write_points, tmp_path / "b.ply", replace(points, xyz=far))
     assert len(read_points(tmp_path / "a.ply")) == len(points)
     assert not (tmp_path / "b.ply").exists()
+
+
+def test_a_figure_whose_square_no_machine_holds():
+    from viewbench.reports import _study as of_reports
+
+    assert (of_reports._number("1e9"), of_reports._number("inf")) == (1e9, None)
+    with pytest.raises(ValueError, match="no figure"):  # of which `read_cells` makes a sentence
+        of_reports._number("1e300")
