@@ -10,10 +10,11 @@ from typing import Any
 
 from ..common.errors import UserError
 from ..common.files import read_json
-from ._study_kinds import check_kinds, check_scene
+from ._study_kinds import check_kinds, check_record, check_scene
 
 FULL = "full"  # the selector name of the full-data reference
 OK = "ok"
+LARGEST = 1e100  # of a figure: its square is a number, too
 NOT_RUN = "not run yet"  # the study was stopped before it came to the cell
 
 
@@ -48,7 +49,13 @@ class Cell:
 
     def read(self, name: str) -> dict[str, Any]:
         """The cell's "selection", "train" or "metrics" file; raises UserError when it is missing or broken."""
-        return read_json(self.folder / f"{name}.json", name)
+        path = self.folder / f"{name}.json"
+        record = read_json(path, name)
+        try:
+            check_record(name, record)
+        except KeyError as error:
+            raise UserError(f"{name} '{path}' has no {error} as viewbench writes it; run the study again") from None
+        return record
 
 
 @dataclass(frozen=True)
@@ -282,6 +289,8 @@ def _cell(row: dict[str, str], folder: Path) -> Cell:
 
 def _number(text: str) -> float | None:
     value = float(text) if text else math.nan
+    if LARGEST < abs(value) < math.inf:
+        raise ValueError(f"{text[:40]} is no figure")
     return value if math.isfinite(value) else None
 
 

@@ -16,6 +16,10 @@ NAMED: dict[str, dict[str, type]] = {  # entries of these lists: what they have,
 }
 GRID = {"selectors": str, "ratios": (int, float)}
 
+FIGURE = (int, float, type(None))
+CURVE = dict.fromkeys(("step", "seconds", "test_psnr_db"), FIGURE)
+VIEW: dict[str, Any] = {"name": str, "file": str, "psnr_db": FIGURE, "ssim": FIGURE, "lpips": FIGURE}
+
 
 def check_kinds(record: Any) -> None:
     """Raises KeyError, with its name, for a part that the record lacks or that is of another kind."""
@@ -52,6 +56,22 @@ def check_scene(record: Any) -> None:
         _check_rows(record[key][part], 3, part)
     _check_rows(record["points"] or [], 6, "points")
     _check_list(record.get("seen") or [], (int, float), "seen")
+
+
+def check_record(name: str, record: Any) -> None:
+    """Raises KeyError, with its name, for a part of a cell's selection, train or metrics that is of another kind."""
+    if not isinstance(record, dict):
+        raise KeyError("everything")
+    if name == "selection":
+        _check_list(record.get("indices", []), int, "indices")
+    parts, key = {"train": (CURVE, "curve"), "metrics": (VIEW, "views")}.get(name, ({}, ""))
+    entries = record.get(key, [])
+    _check_list(entries, dict, key)
+    for entry in entries:
+        if not all(isinstance(entry.get(part), kind) for part, kind in parts.items()):
+            raise KeyError(key)
+    if name == "train" and not isinstance(record.get("gpu") or {"shared": None}, dict):
+        raise KeyError("gpu")
 
 
 def _check_rows(rows: Any, length: int, key: str) -> None:

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..common.errors import UserError
+from ..scenes.image_files import open_image
 from . import _figures
 from ._items import Item
 from ._statistics import number
@@ -31,6 +33,11 @@ def _strip(study: Study, backend: str, scene: str, out: Path) -> Item | None:
     if not cells or not views[cells[0].selector]:
         return None
     total = len(views[cells[0].selector])
+    other = next((cell for cell in cells if len(views[cell.selector]) != total), None)
+    if other is not None:
+        raise UserError(
+            f"'{other.folder}' has not {total} scored views as '{cells[0].folder}' has; run the study again"
+        )
     chosen = sorted({(2 * place + 1) * total // (2 * VIEWS) for place in range(VIEWS)})
     # The truth is optional, and so is its column.
     truth = study.folder / "scenes" / scene
@@ -76,9 +83,7 @@ def _short(name: str) -> str:
 
 def _picture(path: Path) -> np.ndarray:
     """(H, W, 3) uint8."""
-    from PIL import Image
-
-    with Image.open(path) as image:
+    with open_image(path) as image:
         return np.asarray(image.convert("RGB"))
 
 

@@ -34,9 +34,15 @@ def read_points(path: Path) -> Points:
 
 
 def write_points(path: Path, points: Points) -> None:
-    """Writes positions and colours as binary PLY, whole or not at all; the 3DGS authors' reader insists on normals."""
+    """Writes positions and colours as binary PLY, whole or not at all; the 3DGS authors' reader insists on normals.
+
+    Raises UserError for a point so far away that float32, which readers expect, does not hold it.
+    """
     from plyfile import PlyData, PlyElement
 
+    far = np.flatnonzero((np.abs(points.xyz) > np.finfo(np.float32).max).any(axis=1))
+    if len(far):
+        raise UserError(f"point {far[0]} of the capture is too far away for '{path.name}'; take it out of the capture")
     layout = [
         *((axis, "<f4") for axis in ("x", "y", "z", "nx", "ny", "nz")),
         *((name, "u1") for name in ("red", "green", "blue")),

@@ -677,3 +677,42 @@ def test_files_of_a_run_that_no_run_wrote(tmp_path, content):
     (tmp_path / "held.json").write_bytes(content)
     with open(tmp_path / "held.json", "rb") as held:
         assert not _alone._lives(holding.read(held.fileno()).get("pid"))
+
+
+RECORDS = [
+    *[("selection", "indices", ["a"]), ("selection", "indices", 3), ("train", "curve", 0.5), ("train", "curve", [3])],
+    *[("train", "curve", [{"step": {}}]), ("train", "gpu", "a"), ("metrics", "views", [{"name": "a"}])],
+]
+
+
+@pytest.mark.parametrize(("name", "key", "value"), RECORDS)
+def test_records_of_cells_that_reports_cannot_use(tmp_path, name, key, value):
+    from tests.reports.fixtures import make_study
+    from viewbench.reports import _study as of_reports
+
+    folder = make_study(tmp_path / "study", scenes=("room_human",), selectors=("random",), ratios=(0.1,), seeds=(0,))
+    cell = of_reports.load(folder).done[0]
+    record = cell.read(name)
+    (cell.folder / f"{name}.json").write_text(json.dumps({**record, key: value}))
+    assert key in refused(cell.read, name)
+
+
+def test_a_point_too_far_away_for_the_files_of_others(tmp_path):
+    from viewbench.scenes.ply import read_points, write_points
+
+    points = _scenes.room(tmp_path / "room").points
+    assert points is not None
+    write_points(tmp_path / "a.ply", points)
+    far = points.xyz.copy()
+    far[3, 1] = -1e39
+    assert "point 3" in refused(write_points, tmp_path / "b.ply", replace(points, xyz=far))
+    assert len(read_points(tmp_path / "a.ply")) == len(points)
+    assert not (tmp_path / "b.ply").exists()
+
+
+def test_a_figure_whose_square_no_machine_holds():
+    from viewbench.reports import _study as of_reports
+
+    assert (of_reports._number("1e9"), of_reports._number("inf")) == (1e9, None)
+    with pytest.raises(ValueError, match="no figure"):  # of which `read_cells` makes a sentence
+        of_reports._number("1e300")
