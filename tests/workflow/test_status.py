@@ -84,6 +84,10 @@ def status(clone: Clone) -> tuple[int, dict]:
     return done.returncode, json.loads(done.stdout)
 
 
+def running(clone: Clone) -> list[dict]:
+    return [cell for cell in status(clone)[1]["cells"] if cell["state"] == "running"]
+
+
 def said(clone: Clone) -> str:
     return clone.call("viewbench", "status", "mini").stdout
 
@@ -119,7 +123,7 @@ def test_the_life_of_a_study(clone):
         (place / name).touch()
     run = begun(clone)
     try:
-        until(lambda: status(clone)[1]["counts"]["running"] > 0 and (place / "training").exists())
+        until(lambda: any(cell["cell"].startswith("command-moody/") for cell in running(clone)))
         code, found = status(clone)
         assert (code, found["run"]["alive"], found["run"]["pid"]) == (3, True, run.pid)
         text = said(clone)
@@ -137,6 +141,7 @@ def test_the_life_of_a_study(clone):
     run = begun(clone)
     try:
         until((place / "training").exists)
+        until(lambda: bool(running(clone)))
     finally:
         os.killpg(run.pid, signal.SIGINT)
         run.wait()
