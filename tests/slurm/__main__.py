@@ -8,10 +8,10 @@ the end, whatever happens. A study of 24 cells is run on one machine, and again 
 
 * choices get too little memory at first, and are killed;
 * the main process is killed while jobs run and wait, and started again;
-* of the jobs with cells one is cancelled, one runs out of time, and one loses its node.
+* of the jobs with cells one is cancelled, one hangs until its time is up, and one loses its node.
 
-Then both must have the same results, bit for bit; no cell may have been written by two jobs at once; a job asks for
-a GPU only where its rule does; what Slurm counted is printed, and summed.
+Then both must have the same results, bit for bit; a job asks for a GPU only where its rule does; what Slurm counted is
+printed, and summed.
 """
 
 import argparse
@@ -79,7 +79,6 @@ def attempt(folder: Path) -> int:
         left = cluster.call("squeue", "--noheader", "--format=%i %T").splitlines()
         say(f"killed; {len(left)} jobs are left in the queue; starting it again")
         wrong += [] if left else ["no job was left when the main process was killed"]
-        subprocess.run(command(two, SLURM, "--unlock"), cwd=two, env=environment(cluster), check=True)
         before = {line.split()[0] for line in left}
         main_process = by_slurm(two, cluster)
         harm(main_process, cluster, before)
@@ -114,7 +113,8 @@ def harm(main_process: subprocess.Popen, cluster: Cluster, seen: set[str]) -> No
     say(f"cancelled job {number}")
     number = another()
     cluster.call("scontrol", "update", f"JobId={number}", "TimeLimit=1")
-    say(f"job {number} has a minute")
+    cluster.call("scancel", "--full", "--signal=STOP", number)
+    say(f"job {number} hangs, and has a minute")
     number = another()
     node = cluster.call("squeue", "--noheader", "--jobs", number, "--format=%N").strip()
     cluster.fail(node)
