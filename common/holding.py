@@ -59,6 +59,19 @@ def me() -> dict[str, Any]:
     return {"pid": os.getpid(), "since": time.strftime("%Y-%m-%d %H:%M:%S"), **machine()}
 
 
+def began(pid: int) -> str:
+    """When a process of this machine began, in ticks since the machine did (field 22 of /proc/PID/stat, proc(5)).
+
+    Empty where there is none, or one that has ended and was not waited for, or no /proc.
+    """
+    try:
+        # The name of the program, in parentheses, may have spaces and parentheses in it.
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+        return "" if fields[0] == "Z" else fields[19]
+    except (OSError, IndexError):
+        return ""
+
+
 def reaches(record: dict[str, Any]) -> bool:
     """Whether a lock of the process that wrote the record would be seen here: it runs, or ran, on this machine."""
     now = machine()

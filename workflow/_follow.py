@@ -12,6 +12,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+from ..common import holding
+
 RUN = "VIEWBENCH_RUN"  # of a run on this machine: its process, when that began, and the namespace of its number
 GRACE_S = 30.0  # for a job to remove what it has half written
 
@@ -20,7 +22,7 @@ def lead(workflow: Any) -> None:
     """Has the jobs of this run, which are processes of this machine, follow it; a closed terminal stops it as Ctrl-C
     does."""
     if workflow.local_exec:
-        os.environ[RUN] = f"{os.getpid()} {_began(os.getpid())} {_namespace()}"
+        os.environ[RUN] = f"{os.getpid()} {holding.began(os.getpid())} {_namespace()}"
     if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) == signal.SIG_DFL:
         signal.signal(signal.SIGHUP, signal.default_int_handler)
 
@@ -40,7 +42,7 @@ def follow() -> None:
         raise KeyboardInterrupt from None
     except OSError:
         return
-    if _began(pid) != words[1]:  # its number is another's by now
+    if holding.began(pid) != words[1]:  # its number is another's by now
         raise KeyboardInterrupt
 
     def wait() -> None:
@@ -50,14 +52,6 @@ def follow() -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
     threading.Thread(target=wait, name="follows its run", daemon=True).start()
-
-
-def _began(pid: int) -> str:
-    """When the process began, in ticks since this machine did; empty where that cannot be told."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[19]
-    except (OSError, IndexError):
-        return ""
 
 
 def _namespace() -> str:

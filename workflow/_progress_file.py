@@ -2,13 +2,13 @@
 
 import contextlib
 import os
-import socket
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..common import holding
 from ..common.errors import UserError
 from ..common.files import read_json, write_json
 
@@ -72,8 +72,8 @@ class Run:
         """Whether it goes on: by its process where that is on this machine, else by when it was heard of last."""
         if self.ended:
             return False
-        if self.host == socket.gethostname() and self.boot == _boot():
-            return _started(self.pid) == self.started
+        if self.started and (self.host, self.boot) == (holding.machine()["host"], holding.machine()["boot"]):
+            return holding.began(self.pid) == self.started
         return time.time() - self.said < GONE_S
 
 
@@ -98,9 +98,8 @@ class RunFile:
         record = {
             "schema": 1,
             "pid": os.getpid(),
-            "host": socket.gethostname(),
-            "boot": _boot(),
-            "started": _started(os.getpid()),
+            **holding.machine(),
+            "started": holding.began(os.getpid()),
             "began": self.began,
             "said": now,
             "ended": self.ended,
@@ -162,23 +161,3 @@ def _seconds(value: Any) -> float:
     if not abs(float(value)) <= LATEST_S:
         raise ValueError("no time")
     return float(value)
-
-
-def _boot() -> str:
-    """Which start of this machine it is: numbers of processes begin anew with each."""
-    with contextlib.suppress(OSError):
-        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
-    return ""
-
-
-def _started(pid: int) -> str:
-    """When the process began, in ticks since the machine did; "" where it is not there, or no /proc is."""
-    with contextlib.suppress(OSError, IndexError, ValueError):
-        # The name of the program, in parentheses, may have spaces; the 22nd field is the 20th after it (proc(5)).
-        fields = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
-        return "" if fields[0] == "Z" else fields[19]
-    if not Path("/proc/self/stat").exists():
-        with contextlib.suppress(OSError):
-            os.kill(pid, 0)
-            return "there"
-    return ""

@@ -134,7 +134,7 @@ except KeyboardInterrupt:
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="processes are watched on Linux alone")
 def test_a_job_ends_with_its_run():
     run = subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE)
-    name = f"{run.pid} {_follow._began(run.pid)} {_follow._namespace()}"
+    name = f"{run.pid} {holding.began(run.pid)} {_follow._namespace()}"
 
     def job(name: str, seconds: float) -> subprocess.Popen:
         command = [sys.executable, "-c", FOLLOWS.format(seconds=seconds)]
