@@ -52,9 +52,9 @@ def heal(study: Study, results: Path, verify: bool = False) -> list[Path]:
 
 def say(removed: list[Path]) -> None:
     """Tells the user which damaged results are made again, in one line; stamps of logging are none."""
-    names = sorted(
-        {str(path) for path in removed if not path.name.startswith("tracked") and "tracked" not in path.parts}
-    )
+    told = [path for path in removed if not path.name.startswith("tracked") and "tracked" not in path.parts]
+    # Of a cell it is the record that goes, whichever of its files is damaged.
+    names = sorted({str(path.parent if "cells" in path.parts else path) for path in told})
     if names:
         more = f" and {len(names) - 1} more" if len(names) > 1 else ""
         print(f"viewbench: damaged or altered, so made again: {names[0]}{more}", file=sys.stderr)

@@ -42,6 +42,7 @@ class Progress(logging.Handler):
         self.width = 0  # of what stands on the terminal's line
         self.over = threading.Event()
         self.folder: Path | None = None  # results/STUDY, of a real run
+        self.scheduler = ""  # that jobs are handed to
         self.file: RunFile | None = None  # what `viewbench status` reads, once the folder is this run's alone
 
     def start(self) -> None:
@@ -75,7 +76,7 @@ class Progress(logging.Handler):
             self.pace.plan(getattr(record, "stats", None) or {})
             self.phase = "starting"
             if self.folder and not self.file:
-                self.file = RunFile(self.folder)
+                self.file = RunFile(self.folder, self.scheduler)
                 atexit.register(self.ends, "stopped")
             self._show(at_once=True)
             self._tell(at_once=True)
@@ -215,6 +216,7 @@ def attach(workflow: Any, study: str) -> Progress:
             handler.addFilter(progress.passes)
     logger.addHandler(progress)
     progress.folder = Path("results") / study
+    progress.scheduler = "" if workflow.local_exec else str(getattr(workflow.executor_plugin, "name", "scheduler"))
     progress.start()
     return progress
 
@@ -227,6 +229,14 @@ def _worth_reading(record: logging.LogRecord) -> bool:
         of_a_job = getattr(record, "exception", "") == "RuleException" and "CalledProcessError" in str(record.msg)
         return getattr(event, "name", "") == "ERROR" and not of_a_job
     return record.levelno >= logging.WARNING or "Nothing to be done" in str(record.msg)
+
+
+def farewell(progress: Progress) -> None:
+    """After a run that did not come to its end: whether it was stopped, for which Snakemake says that jobs failed."""
+    progress.stop()
+    progress.ends("failed" if progress.failures else "stopped")
+    if not progress.failures:
+        print("viewbench: stopped; the same command goes on from here", file=sys.stderr, flush=True)
 
 
 def salvage(study: Any, given: str) -> None:

@@ -2,6 +2,8 @@
 
 import contextlib
 import os
+import shlex
+import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,6 +15,7 @@ from ..common.errors import UserError
 from ..common.files import read_json, write_json
 
 FILE = "progress.json"
+COMMAND = "VIEWBENCH_COMMAND"  # what `viewbench run` was asked, which calls snakemake, and in which folder
 EVERY_S = 2.0  # between two writings where something happens
 SILENT_S = 20.0  # and where nothing does
 LATEST_S = 1e11  # a time that people can be told of: the year 5138
@@ -64,6 +67,9 @@ class Run:
     doing: str
     running: tuple[Job, ...]
     failed: tuple[Job, ...]
+    command: str = ""  # what was typed
+    folder: str = ""  # and where
+    scheduler: str = ""  # that its jobs are handed to, where they wait in a queue; "" on one machine
     boot: str = ""
     started: str = ""
 
@@ -80,8 +86,8 @@ class Run:
 class RunFile:
     """Writes the file of one run, whole each time, and not more often than anybody reads it."""
 
-    def __init__(self, folder: Path):
-        self.file = folder / FILE
+    def __init__(self, folder: Path, scheduler: str = ""):
+        self.file, self.scheduler = folder / FILE, scheduler
         self.began, self.wrote = time.time(), 0.0
         self.failed: dict[str, dict[str, Any]] = {}  # by what the jobs were to make
         self.ended = ""
@@ -95,11 +101,15 @@ class RunFile:
             {"rule": job.rule, "wildcards": dict(job.wildcards), "since": now - (clock - job.began)}
             for job in list(pace.running.values())
         ]
+        command, _, folder = os.environ.get(COMMAND, shlex.join(["snakemake", *sys.argv[1:]])).partition("\n")
         record = {
             "schema": 1,
             "pid": os.getpid(),
             **holding.machine(),
             "started": holding.began(os.getpid()),
+            "command": command,
+            "folder": folder or str(Path.cwd()),
+            "scheduler": self.scheduler,
             "began": self.began,
             "said": now,
             "ended": self.ended,
@@ -148,6 +158,9 @@ def read(folder: Path) -> Run | None:
             ended=str(record["ended"]),
             seconds_left=None if left is None else _seconds(left),
             doing=str(record["doing"]),
+            command=str(record.get("command", "")),
+            folder=str(record.get("folder", "")),
+            scheduler=str(record.get("scheduler", "")),
             boot=str(record["boot"]),
             started=str(record["started"]),
             **jobs,

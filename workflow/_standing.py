@@ -97,4 +97,6 @@ def _of(
 
 def _brief(text: str) -> str:
     """What `collect` says of a stale cell, without the cell and without what to do, which the next run does."""
-    return (text.partition(" is stale: ")[2] or text).partition("; delete ")[0]
+    if text.startswith("cell '"):
+        text = text.partition("' is stale: ")[2] or text.partition("': ")[2]
+    return text.partition("; delete ")[0].partition("; make it again")[0]

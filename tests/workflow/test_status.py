@@ -135,6 +135,9 @@ def test_the_life_of_a_study(clone):
     code, found = status(clone)
     assert (code, found["run"]["alive"], found["counts"]["running"]) == (3, False, 0)
     assert "the last run was killed" in said(clone)
+    assert "; the same command goes on from here: snakemake -j2 --config study=mini -- reports\n" in said(clone)
+    elsewhere = clone.call("viewbench", "status", "mini", "--results", str(place))
+    assert f"there is no '{place / 'mini'}' here" in elsewhere.stdout
     assert sum(found["counts"].values()) == 6
 
     (place / "training").unlink()
@@ -162,7 +165,7 @@ def test_the_life_of_a_study(clone):
     clone.run()
     code, found = status(clone)
     assert (code, found["counts"]["done"], found["run"]["ended"]) == (0, 6, "finished")
-    assert said(clone) == "mini: 6 of 6 cells done\n"
+    assert said(clone) == "mini: 6 of 6 cells done\nthe page: results/mini/reports/index.html\n"
 
     cell = clone.results / "cells" / "splat" / "walk" / "uniform" / "0.2" / "0"
     for file, words in {"model.ply": "files of the model are", "renders": "renders are"}.items():

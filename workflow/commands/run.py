@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import click
 
 NEEDED = ("snakemake", "jsonschema", "yaml", "numba", "skimage", "matplotlib", "jinja2", "mlflow")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+COMMAND = "VIEWBENCH_COMMAND"  # workflow/_progress_file.py
 CATALOGUE = "VIEWBENCH_CATALOGUE"  # common/catalogue.py
 # Settings that name what is read; what is written (results/...) belongs to the folder of the study.
 READ = {
@@ -98,6 +100,9 @@ def environment(settings: Any) -> dict[str, str]:
     scripts = [str(Path(sys.executable).parent), sysconfig.get_path("scripts", user)]
     found["PATH"] = os.pathsep.join([*scripts, found.get("PATH", os.defpath)])
     found["VIEWBENCH_ENVIRONMENT"] = str(settings.source.absolute())
+    found[COMMAND] = (
+        shlex.join(["viewbench", *sys.argv[1:]]) + f"\n{Path.cwd()}"
+    )  # what `viewbench status` says goes on
     if CATALOGUE in found:
         found[CATALOGUE] = str(Path(found[CATALOGUE]).absolute())
     for variable, (section, key) in READ.items():

@@ -36,6 +36,8 @@ def command(context: click.Context, study: str, results: Path, everything: bool,
     settings = settings_file.load()
     checked = _study.load(study, settings)
     folder = results / checked.name
+    if not folder.is_dir() and (results / "results" / checked.name).is_dir():
+        folder = results / "results" / checked.name  # what `viewbench run --out DIR` was given
     run = _progress_file.read(folder)
     cells = _standing.standing(checked, folder, settings, run)
     counts = _standing.counts(cells)
@@ -44,7 +46,7 @@ def command(context: click.Context, study: str, results: Path, everything: bool,
         record = _record(checked, run, cells, counts, _left(run))
         click.echo(json.dumps({**record, "failed_beside": [asdict(job) for job in others]}, indent=1))
     else:
-        lines = _lines(checked, study, run, cells, counts, None if everything else SHOWN)
+        lines = _lines(checked, folder, study, run, cells, counts, None if everything else SHOWN)
         lines += [f"failed: {job.rule}: {job.words or 'it left no word'} ({job.log})" for job in others]
         click.echo("\n".join(map(printable, lines)))
     unfinished = len(cells) - counts["done"]
@@ -59,40 +61,59 @@ def _left(run: "Run | None") -> float | None:
 
 
 def _lines(
-    study: "Study", given: str, run: "Run | None", cells: "list[Standing]", counts: dict[str, int], most: int | None
+    study: "Study",
+    folder: Path,
+    given: str,
+    run: "Run | None",
+    cells: "list[Standing]",
+    counts: dict[str, int],
+    most: int | None,
 ) -> list[str]:
-    from .._pace import clock
     from .._standing import work_left
 
     parts = [f"{counts['done']} of {len(cells)} cells done"]
     parts += [f"{count} {state}" for state, count in counts.items() if count and state != "done"]
     left = _left(run)
-    lines = [f"{study.name}: {', '.join(parts)}" + ("" if left is None else f"; about {clock(left)} left")]
+    lines = [f"{study.name}: {', '.join(parts)}" + ("" if left is None else f"; about {_spoken(left)} left")]
+    page = folder / "reports" / "index.html"
     if run is not None and run.alive:
         at = time.strftime("%H:%M", time.localtime(run.began))
         lines.append(f"running since {at} (process {run.pid} on {run.host}): {run.doing}")
+        if run.scheduler:
+            lines.append(f"jobs that {run.scheduler} was given are counted as running; some may wait in its queue")
     elif counts["done"] < len(cells):
-        lines.append(_stopped(given, run))
+        lines.append(_stopped(folder, given, run))
         work = work_left(cells)
-        if work is not None:
-            lines.append(f"about {clock(work)} of training and scoring are left for one job at a time")
+        if work is not None and work >= 60:
+            lines.append(f"about {_spoken(work)} of training and scoring are left for one job at a time")
+    elif page.is_file():
+        lines.append(f"the page: {page}")
     for state in ("running", "failed", "stale"):
         of_state = [cell for cell in cells if cell.state == state]
         for cell in of_state[:most]:
-            ago = "" if cell.since is None else f" for {clock(time.time() - cell.since)}"
+            ago = "" if cell.since is None else f" for {_spoken(time.time() - cell.since)}"
             lines.append(f"{state}: {cell.cell}: {cell.words}{ago}" + (f" ({cell.log})" if cell.log else ""))
         if most is not None and len(of_state) > most:
             lines.append(f"{state}: {len(of_state) - most} more; --all lists them")
     return lines
 
 
-def _stopped(given: str, run: "Run | None") -> str:
-    again = f"`snakemake -j2 --config study={given} -- reports` or `viewbench run {given}` goes on from here"
+def _stopped(folder: Path, given: str, run: "Run | None") -> str:
     if run is None:
-        return f"nothing runs; {again}"
+        nothing = "" if folder.is_dir() else f"there is no '{folder}' here (--results names the folder that it is in); "
+        return f"nothing runs; {nothing}`snakemake -j2 --config study={given} -- reports` or `viewbench run {given}` begins"
     at = time.strftime("%Y-%m-%d %H:%M", time.localtime(run.said))
     how = f"has {run.ended}" if run.ended in ("finished", "failed") else "was stopped" if run.ended else "was killed"
-    return f"nothing runs: the last run {how}, {at}; {again}"
+    where = f", in {run.folder}" if run.folder and Path(run.folder) != Path.cwd() else ""
+    return f"nothing runs: the last run {how}, {at}; the same command goes on from here: {run.command}{where}"
+
+
+def _spoken(seconds: float) -> str:
+    """`3 s`, `2 min 41 s`, `5 h 3 min`."""
+    minutes, rest = divmod(max(0, round(seconds)), 60)
+    if minutes >= 60:
+        return f"{minutes // 60} h {minutes % 60} min"
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
 
 
 def _record(
