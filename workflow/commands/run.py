@@ -100,9 +100,7 @@ def environment(settings: Any) -> dict[str, str]:
     scripts = [str(Path(sys.executable).parent), sysconfig.get_path("scripts", user)]
     found["PATH"] = os.pathsep.join([*scripts, found.get("PATH", os.defpath)])
     found["VIEWBENCH_ENVIRONMENT"] = str(settings.source.absolute())
-    found[COMMAND] = (
-        shlex.join(["viewbench", *sys.argv[1:]]) + f"\n{Path.cwd()}"
-    )  # what `viewbench status` says goes on
+    found[COMMAND] = shlex.join(["viewbench", *sys.argv[1:]]) + f"\n{Path.cwd()}"  # for `viewbench status` to say
     if CATALOGUE in found:
         found[CATALOGUE] = str(Path(found[CATALOGUE]).absolute())
     for variable, (section, key) in READ.items():

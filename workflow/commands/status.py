@@ -101,7 +101,7 @@ def _lines(
 def _stopped(folder: Path, given: str, run: "Run | None") -> str:
     if run is None:
         nothing = "" if folder.is_dir() else f"there is no '{folder}' here (--results names the folder that it is in); "
-        return f"nothing runs; {nothing}`snakemake -j2 --config study={given} -- reports` or `viewbench run {given}` begins"
+        return f"nothing runs; {nothing}it begins by: snakemake -j2 --config study={given} -- reports"
     at = time.strftime("%Y-%m-%d %H:%M", time.localtime(run.said))
     how = f"has {run.ended}" if run.ended in ("finished", "failed") else "was stopped" if run.ended else "was killed"
     where = f", in {run.folder}" if run.folder and Path(run.folder) != Path.cwd() else ""
