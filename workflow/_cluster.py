@@ -51,6 +51,7 @@ def start(workflow: Any) -> None:
     """Before the first job, when Snakemake has the folder locked, so that no other run is at it."""
     if not workflow.is_main_process or workflow.executor_plugin.name != SLURM:
         return
+    _check_scheduler()
     cancel_leftovers(RUNS)
     executor = workflow.scheduler._executor
     # The plugin gives all jobs of a run one name.
@@ -61,6 +62,19 @@ def start(workflow: Any) -> None:
             if not job.is_local:
                 for file in job.output:
                     Path(file).unlink(missing_ok=True)
+
+
+def _check_scheduler() -> None:
+    """Raises WorkflowError where Slurm does not answer: the plugin would wait without a word."""
+    from snakemake.exceptions import WorkflowError
+
+    try:
+        _queued(["nobody"])
+    except (OSError, subprocess.SubprocessError) as error:
+        said = str(getattr(error, "stderr", None) or error).strip().splitlines()
+        raise WorkflowError(
+            f"Slurm does not answer here, squeue says: {said[-1] if said else 'nothing'}; type this on a login node"
+        ) from None
 
 
 def cancel_leftovers(runs: Path) -> None:
