@@ -7,7 +7,9 @@ import sys
 import pytest
 
 from tests.workflow.clones import Clone, take_frames
+from viewbench.common import holding
 from viewbench.common.settings import PACKAGE
+from viewbench.workflow import _alone
 
 STUDY = """
 title: A room that is drawn first
@@ -100,12 +102,12 @@ def test_a_dry_run_beside_a_run_leaves_its_stamps(clone, tmp_path):
     stamp = clone.results / "rendered" / "drawn" / "1-of-2"
     stamp.parent.mkdir(parents=True)
     stamp.touch()
-    locks = clone.folder / ".snakemake" / "locks"
-    locks.mkdir(parents=True)
-    (locks / "0.output.lock").touch()
-    clone.snakemake("-n", VIEWBENCH_DATA=str(tmp_path / "data"))
-    assert stamp.exists()
-    shutil.rmtree(locks)
+    with open(clone.results / _alone.FILE, "w+") as held:
+        assert holding.lock(held.fileno())
+        holding.write(held.fileno(), holding.me())
+        clone.snakemake("-n", VIEWBENCH_DATA=str(tmp_path / "data"))
+        assert stamp.exists()
+        holding.write(held.fileno(), {})
     clone.snakemake("-n", VIEWBENCH_DATA=str(tmp_path / "data"))
     assert not stamp.exists()
 
