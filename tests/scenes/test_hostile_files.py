@@ -134,10 +134,10 @@ def test_locks_of_another_user_lead_nowhere(tmp_path, monkeypatch):
     home = tmp_path / "home"
     home.mkdir(mode=0o700)
     (tmp_path / "tmp" / gpu.FOLDER).symlink_to(home)
-    (home / "uuid").symlink_to(tmp_path / "precious")
+    (home / "GPU-uuid").symlink_to(tmp_path / "precious")
     (tmp_path / "precious").write_text("kept")
     (tmp_path / "precious").chmod(0o600)
-    assert gpu._lock("uuid") == -1
+    assert gpu._lock("GPU-uuid") == -1
     assert home.stat().st_mode & 0o777 == 0o700
     assert (tmp_path / "precious").stat().st_mode & 0o777 == 0o600
     held = gpu._lock("another")
@@ -186,6 +186,8 @@ def test_what_is_copied_is_a_picture(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros(3))
     check_picture(tmp_path / "a.npy")
     for content in (b"", b"-----BEGIN OPENSSH PRIVATE KEY-----", b"root:x:0:0", b"{}"):
-        (tmp_path / "a.png").write_bytes(content)
+        (tmp_path / "secret").write_bytes(content)
+        (tmp_path / "a.png").unlink()
+        (tmp_path / "a.png").symlink_to("secret")
         with pytest.raises(UserError, match="no picture"):
             check_picture(tmp_path / "a.png")
