@@ -13,7 +13,7 @@ def test_the_sets_have_all_but_torch():
     named = {Requirement(line).name for line in versions.asked()}
     assert not named & {"torch", "torchvision", "open_clip_torch", "lpips", "gsplat", "viewbench"}
     of_torch = {Requirement(line).name for extra in versions.TORCH for line in extras[extra]}
-    left_out = {"dev", "render", "rooms", *versions.TORCH, *versions.EXTRAS}
+    left_out = {"dev", "render", "rooms", "cluster", *versions.TORCH, *versions.EXTRAS}
     assert set(extras) == left_out, "a new extra: say whether it wants torch"
     for extra in versions.EXTRAS:
         assert {Requirement(line).name for line in extras[extra]} - of_torch - {"viewbench"} <= named

@@ -1,7 +1,6 @@
 """What may pass is tried again in a fresh process, also by the fork server; what will not is not."""
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -110,7 +109,7 @@ def test_a_wait_can_be_stopped(place, small_room):
     while "tried again" not in said.readline():
         pass
     time.sleep(1)  # it starts again, and then waits
-    process.send_signal(signal.SIGINT)
+    process.terminate()
     process.communicate(timeout=60)
     assert process.returncode != 0
     assert begun(place) == 1

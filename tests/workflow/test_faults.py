@@ -182,7 +182,7 @@ def test_a_row_of_the_cache_that_was_altered_is_embedded_again(tmp_path):
         features.save(file, np.arange(4.0))
         damage(file, how)
         assert features.cached(file) is None
-    np.save(file, np.arange(4.0))  # without a hash, as others write it
+    np.save(file, np.arange(4, dtype=np.float32))  # without a hash, as others write it
     assert features.cached(file) is not None
 
 
