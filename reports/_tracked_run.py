@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..common.cells import AXES, cell_name
-from ..common.files import read_json
+from ..common.cells import AXES, RECORDS, cell_name, figures, read_records
 
 CELL, FINGERPRINT, WRITER = "viewbench.cell", "viewbench.fingerprint", "viewbench.writer"
-FILES = ("selection.json", "train.json", "metrics.json")
 LONGEST = 6000  # letters of a parameter that MLflow takes
 
 
@@ -30,16 +28,14 @@ class Content:
 def fingerprint(folder: Path) -> str:
     """Hash of a cell's files; raises OSError where one is missing."""
     digest = hashlib.sha256()
-    for name in FILES:
+    for name in RECORDS:
         digest.update((folder / name).read_bytes() + b"\0")
     return digest.hexdigest()
 
 
 def content(cell: dict[str, str], folder: Path, renders: int) -> Content:
     """What is logged of the cell, with so many of its renders; raises UserError for a file that cannot be read."""
-    selection = read_json(folder / "selection.json", "selection")
-    train = read_json(folder / "train.json", "training record")
-    metrics = read_json(folder / "metrics.json", "metrics")
+    selection, train, metrics = read_records(folder)
     tags = {
         CELL: cell_name(cell),
         "commit": train["commit"],
@@ -53,19 +49,9 @@ def content(cell: dict[str, str], folder: Path, renders: int) -> Content:
     values |= {f"option.{key}": value for key, value in train.get("options", {}).items()}
     values |= {f"selector.{key}": value for key, value in selection["parameters"].items()}
     params = {key: str(value)[:LONGEST] for key, value in values.items() if value is not None}
-    final = {
-        "psnr_db": metrics["psnr_db"],
-        "ssim": metrics["ssim"],
-        "lpips": metrics["lpips"],
-        "select_s": sum(selection["seconds"].values()),
-        "train_s": train["seconds"],
-        "evaluate_s": metrics["seconds"],
-        "iterations": train["iterations"],
-        "peak_rss_bytes": train["peak_rss_bytes"],
-        "n_primitives": train["n_primitives"],
-    }
+    final = {**figures(selection, train, metrics), "n_primitives": train["n_primitives"]}
     logged = [(key, value, 0, 0) for key, value in final.items() if _is_number(value)]
-    files: list[tuple[Path, str | None]] = [(folder / name, None) for name in FILES]
+    files: list[tuple[Path, str | None]] = [(folder / name, None) for name in RECORDS]
     files += [(path, "renders") for path in _samples(metrics, folder, renders)]
     name = "/".join(cell[key] for key in AXES[1:])
     return Content(name, tags, params, logged + _curve(train["curve"]), files)

@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TypeVar
 
-from ..common.cells import AXES, cell_folder, cell_name
+from ..common.cells import AXES, RECORDS, cell_folder, cell_name
 from ..common.errors import UserError
 from ..common.settings import Tracking
 from . import _tracking_errors, _tracking_sqlite
-from ._tracked_run import CELL, FILES, FINGERPRINT
+from ._tracked_run import CELL, FINGERPRINT
 from ._tracking_away import Away
 from ._tracking_errors import Kind, masked
 from ._tracking_log import Log, is_remote
@@ -54,7 +54,7 @@ def track(
     away = Away(results, masked(tracking.uri))
     patience = _Patience(tracking, say)
     done, refused = {"logged": 0, "kept": 0}, []
-    ready = [cell for cell in cells if all((cell_folder(results, cell) / name).is_file() for name in FILES)]
+    ready = [cell for cell in cells if all((cell_folder(results, cell) / name).is_file() for name in RECORDS)]
     with _explained(tracking.uri):
         log = _open(study, tracking, RETRIES, tracking.patience)
         known = patience.ask(log.start)

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..common.cells import cell_folder, cell_name
+from ..common.cells import RECORDS, cell_folder, cell_name, figures, read_records
 from ..common.errors import UserError
-from ..common.files import read_json, sha256_file, whole, write_text
+from ..common.files import sha256_file, whole, write_text
 from ..common.settings import Settings
 from ..reports._study import NOT_RUN
 from ._progress import STOPPED
@@ -97,24 +97,15 @@ def without_stale(cells: list[dict[str, str]], results: Path) -> list[dict[str, 
 
 
 def _figures(cell: dict[str, str], folder: Path, asked: Asked) -> dict[str, Any]:
-    selection = read_json(folder / "selection.json", "selection")
-    train = read_json(folder / "train.json", "training record")
-    metrics = read_json(folder / "metrics.json", "metrics")
+    selection, train, metrics = read_records(folder)
     asked.check(cell, folder, selection, train, metrics)
     scene = asked.scene(cell["scene"])
-    _complete(folder, {"selection.json": selection, "train.json": train, "metrics.json": metrics})
+    _complete(folder, dict(zip(RECORDS, (selection, train, metrics), strict=True)))
     values = {
         "dataset": scene.dataset,
         "n_views": selection["n_views"],
         "count": selection["count"],
-        "psnr_db": metrics["psnr_db"],
-        "ssim": metrics["ssim"],
-        "lpips": metrics["lpips"],
-        "select_s": sum(selection["seconds"].values()),
-        "train_s": train["seconds"],
-        "evaluate_s": metrics["seconds"],
-        "iterations": train["iterations"],
-        "peak_rss_bytes": train["peak_rss_bytes"],
+        **figures(selection, train, metrics),
         "peak_gpu_bytes": train["peak_gpu_bytes"],
         "commit": train["commit"],
         "scene_sha256": scene.sha256,

@@ -7,15 +7,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..backends._evaluate import altered_file
-from ..common.cells import cell_folder
+from ..common.cells import RECORDS, cell_folder
 from ..common.errors import UserError
 from ..common.files import read_json, sha256_file, unsealed
 from ..common.holding import sweep
 from ..reports._tracking import NO_TRACKING
-from ..scenes.features import altered
+from ..scenes.features import array
 from ._collect import COLUMNS, TABLE_SEAL
 from ._study import Study
 
@@ -37,7 +35,7 @@ def heal(study: Study, results: Path, verify: bool = False) -> list[Path]:
     broken += [] if _sound_table(results) else [results / "results.csv"]
     for cell in study.cells():
         folder = cell_folder(results, cell)
-        selection, train, metrics = (folder / f"{name}.json" for name in ("selection", "train", "metrics"))
+        selection, train, metrics = (folder / file for file in RECORDS)
         broken += [path for path in (selection, train, metrics) if path.is_file() and not _sound(path)]
         if train.is_file() and not _whole_model(folder, verify or not metrics.is_file()):
             broken.append(train)
@@ -72,10 +70,9 @@ def _sound(path: Path) -> bool:
 
 
 def _sound_array(path: Path) -> bool:
-    content = path.read_bytes()
-    with contextlib.suppress(ValueError, EOFError):
-        np.load(io.BytesIO(content), allow_pickle=False)
-        return not altered(content)
+    with contextlib.suppress(ValueError):
+        array(path)
+        return True
     return False
 
 

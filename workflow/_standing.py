@@ -3,11 +3,9 @@
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from ..common.cells import cell_folder, cell_name
+from ..common.cells import RECORDS, cell_folder, cell_name, read_records
 from ..common.errors import UserError
-from ..common.files import read_json
 from ..common.settings import Settings
 from ._heal import damage
 from ._progress_file import Job, Run
@@ -15,7 +13,6 @@ from ._stale import Asked
 from ._study import Study
 
 STATES = ("done", "running", "failed", "stale", "to come")
-FILES = ("selection", "train", "metrics")
 
 
 @dataclass(frozen=True)
@@ -75,21 +72,21 @@ def _of(
     if here is not None:
         return Standing(name, "running", here.rule, here.log, here.since)
     lost = next((job for job in failed if job.of(cell, study)), None)
-    there = [(folder / f"{step}.json").is_file() for step in FILES]
-    if all(there):
+    if all((folder / file).is_file() for file in RECORDS):
         try:
-            records: list[Any] = [read_json(folder / f"{step}.json", step) for step in FILES]
+            records = read_records(folder)
             asked.check(cell, folder, *records)
-            damaged = damage(folder)
-            if damaged and lost is None:
-                return Standing(name, "stale", damaged)
-            return Standing(name, "done", seconds=records[1]["seconds"] + records[2]["seconds"])
+            seconds = records[1]["seconds"] + records[2]["seconds"]
+            wrong = damage(folder)
         except UserError as error:
-            if lost is None:
-                return Standing(name, "stale", _brief(str(error)))
+            wrong = _brief(str(error))
         except (KeyError, TypeError, AttributeError) as error:
-            if lost is None:
-                return Standing(name, "stale", f"its files are not what viewbench writes ({type(error).__name__})")
+            wrong = f"its files are not what viewbench writes ({type(error).__name__})"
+        else:
+            if not wrong:
+                return Standing(name, "done", seconds=seconds)
+        if lost is None:
+            return Standing(name, "stale", wrong)
     if lost is not None:  # also where files of an earlier run are there: what was asked for now has failed
         return Standing(name, "failed", f"{lost.rule}: {lost.words or 'it left no word'}", lost.log)
     return Standing(name, "to come")
