@@ -107,14 +107,24 @@ def save(path: Path, array: np.ndarray) -> None:
             file.write(MARK + digest)
 
 
-def altered(content: bytes) -> bool:
-    """Whether the content of a file that `save` wrote is not what it wrote; files of others have no hash, and are
-    taken as they are."""
-    start = len(content) - hashlib.sha256().digest_size
-    bare = start - len(MARK)
-    if bare <= 0 or content[bare:start] != MARK:
-        return False
-    return hashlib.sha256(memoryview(content)[:bare]).digest() != content[start:]
+class AlteredError(ValueError):
+    """A file that `save` wrote is not what it wrote."""
+
+
+def array(path: Path) -> Any:
+    """The array of a .npy file; files of others have no hash, and are taken as they are.
+
+    Raises OSError and ValueError as `bounded.array`, AlteredError where the hash is not that of the rest.
+    """
+    size, end = bounded.checked(path, limits.FEATURE_BYTES), len(MARK) + hashlib.sha256().digest_size
+    with open(path, "rb") as file:
+        file.seek(max(0, size - end))
+        tail = file.read()
+        if size > end and tail.startswith(MARK):
+            file.seek(0)
+            if hashlib.sha256(file.read(size - end)).digest() != tail[len(MARK) :]:
+                raise AlteredError(f"'{path}' was altered since it was written")
+    return bounded.array(path)
 
 
 def load_user_features(path: Path, n: int) -> np.ndarray:
@@ -123,21 +133,22 @@ def load_user_features(path: Path, n: int) -> np.ndarray:
     Raises UserError for a file that is none, has another number of rows than `n`, or NaN in some row.
     """
     try:
-        bounded.checked(path, limits.FEATURE_BYTES)
-        if altered(Path(path).read_bytes()):
-            raise UserError(f"features '{path}' were altered since they were written; delete that file and embed again")
-        array: Any = bounded.array(path)
+        given = array(path)
+    except AlteredError:
+        raise UserError(
+            f"features '{path}' were altered since they were written; delete that file and embed again"
+        ) from None
     except OSError as error:
         raise UserError(f"features '{path}' cannot be read: {error.strerror or error}") from None
     except MemoryError:
         raise UserError(f"features '{path}' cannot be read: there is not enough memory for them") from None
     except (ValueError, EOFError):
         raise UserError(f"features '{path}' are not a .npy file of numbers; write them with numpy.save") from None
-    if getattr(array, "ndim", 0) != 2 or array.dtype.kind not in "fiu" or len(array) != n:
-        found = f"{array.dtype} of shape {array.shape}" if isinstance(array, np.ndarray) else "several arrays"
+    if getattr(given, "ndim", 0) != 2 or given.dtype.kind not in "fiu" or len(given) != n:
+        found = f"{given.dtype} of shape {given.shape}" if isinstance(given, np.ndarray) else "several arrays"
         raise UserError(f"features '{path}' are {found}, expected numbers with one row for each of {n} training views")
     with np.errstate(over="ignore", invalid="ignore"):
-        rows = array.astype(np.float32)
+        rows = given.astype(np.float32)
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(bad):
         raise UserError(f"features '{path}' have NaN or infinity in row {bad[0]} (as float32); embed that image again")
@@ -176,9 +187,7 @@ def picture(path: Path, size: int) -> np.ndarray:
 def cached(file: Path) -> np.ndarray | None:
     """The row in the cache, or None where there is none or it is damaged."""
     try:
-        row: Any = bounded.array(file)
-        if altered(file.read_bytes()):
-            return None
+        row = array(file)
     except (OSError, ValueError):
         return None
     whole_row = isinstance(row, np.ndarray) and row.ndim == 1 and row.dtype == np.float32 and np.isfinite(row).all()
