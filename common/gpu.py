@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from . import holding
 from .errors import UserError
 
 VISIBLE = "CUDA_VISIBLE_DEVICES"
@@ -98,9 +99,7 @@ def hold(wanted: str = "cuda") -> Lease | None:
 
 def _lock(uuid: str) -> int | None:
     """A descriptor that holds the device's lock; None where another process has it."""
-    try:
-        import fcntl
-    except ImportError:
+    if holding.fcntl is None:
         return -1
     folder = Path(tempfile.gettempdir()) / FOLDER
     with contextlib.suppress(OSError):
@@ -117,15 +116,11 @@ def _lock(uuid: str) -> int | None:
         file = _opened(path)
     except OSError:  # a link, or nothing that can be made
         return -1
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(file)
-        return None
-    except OSError:  # a file system without locks
-        os.close(file)
-        return -1
-    return file
+    got = holding.lock(file)
+    if got:
+        return file
+    os.close(file)
+    return None if got is False else -1  # a file system without locks
 
 
 def _opened(path: Path) -> int:

@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import Any
 
 from ._pace import Pace, clock
-from ._progress_file import EVERY_S, RunFile
+from ._progress_file import EVERY_S, Job, RunFile
 
 TICK_S = 1.0  # between two drawings on a terminal
 LITTLE = 1 << 20  # bytes of free space in which no job can be done
 LINE_S = 20.0  # between two lines elsewhere
 BAR = 20  # characters
 # Last words of jobs that ended with their run, and did not fail.
-STOPPED = ("viewbench: stopped", "viewbench: the process that ran this is gone")
+STOPPED = ("viewbench: stopped", "viewbench: the process that ran this is gone", "KeyboardInterrupt")
 
 
 class Progress(logging.Handler):
@@ -130,7 +130,8 @@ class Progress(logging.Handler):
             return
         self.failures.add(output)
         if self.file:
-            self.file.fail(output, rule, ended.wildcards if ended else {}, words, str(logs[-1]) if logs else "")
+            given = dict(ended.wildcards) if ended else {}
+            self.file.failed[output] = Job(rule, given, time.time(), words, str(logs[-1]) if logs else "")
             self._tell(at_once=True)
         self._clear()
         print(f"failed: {rule} of {output}: {words or _no_room() or 'see its log'}", file=self.stream, flush=True)

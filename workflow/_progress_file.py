@@ -6,7 +6,7 @@ import shlex
 import sys
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -34,24 +34,18 @@ class Job:
 
     def of(self, cell: Mapping[str, str], study: Any) -> bool:
         """Whether the cell of the `study` needs this job."""
-        given = self.wildcards
-        if self.rule in ("select", "features", "warm_selector", "warm"):
-            entry = study.selector(cell["selector"])
-            needed = {
-                "features": study.gives_features(entry),
-                "warm_selector": given.get("plugin") == entry.selector,
-                "warm": given.get("trainer") == study.backend(cell["backend"]).backend.replace(":", "-"),
-            }
-            if not needed.get(self.rule, True):
-                return False
-            if self.rule == "select":
-                part, seed = repr(entry.choice_part(float(cell["ratio"]))), str(entry.choice_seed(int(cell["seed"])))
-                if (given.get("part"), given.get("seed")) != (part, seed):
-                    return False
-        elif self.rule not in ("train", "evaluate", "track_cell", "describe", "render", "rendered"):
-            return False
+        given, entry = self.wildcards, study.selector(cell["selector"])
+        choice = repr(entry.choice_part(float(cell["ratio"]))), str(entry.choice_seed(int(cell["seed"])))
+        needed = {
+            **dict.fromkeys(("describe", "render", "rendered", "train", "evaluate", "track_cell"), True),
+            "select": (given.get("part"), given.get("seed")) == choice,
+            "features": study.gives_features(entry),
+            "warm_selector": given.get("plugin") == entry.selector,
+            "warm": given.get("trainer") == study.backend(cell["backend"]).file_name,
+        }
+        # The seed of a choice is not that of the cell.
         axes = ("scene", "selector") if self.rule == "select" else tuple(cell)
-        return all(given[axis] == cell[axis] for axis in axes if axis in given)
+        return needed.get(self.rule, False) and all(given[axis] == cell[axis] for axis in axes if axis in given)
 
 
 @dataclass(frozen=True)
@@ -78,7 +72,8 @@ class Run:
         """Whether it goes on: by its process where that is on this machine, else by when it was heard of last."""
         if self.ended:
             return False
-        if self.started and (self.host, self.boot) == (holding.machine()["host"], holding.machine()["boot"]):
+        here = holding.machine()
+        if self.started and (self.host, self.boot) == (here["host"], here["boot"]):
             return holding.began(self.pid) == self.started
         return time.time() - self.said < GONE_S
 
@@ -87,49 +82,39 @@ class RunFile:
     """Writes the file of one run, whole each time, and not more often than anybody reads it."""
 
     def __init__(self, folder: Path, scheduler: str = ""):
-        self.file, self.scheduler = folder / FILE, scheduler
-        self.began, self.wrote = time.time(), 0.0
-        self.failed: dict[str, dict[str, Any]] = {}  # by what the jobs were to make
+        command, _, place = os.environ.get(COMMAND, shlex.join(["snakemake", *sys.argv[1:]])).partition("\n")
+        self.file, self.wrote = folder / FILE, 0.0
+        self.failed: dict[str, Job] = {}  # by what the jobs were to make
         self.ended = ""
+        self.about = {
+            "schema": 1,
+            "pid": os.getpid(),
+            **holding.machine(),
+            "started": holding.began(os.getpid()),
+            "command": command,
+            "folder": place or str(Path.cwd()),
+            "scheduler": scheduler,
+            "began": time.time(),
+        }
 
     def write(self, pace: Any, seconds_left: float | None, doing: str, at_once: bool = False) -> None:
         """Writes what is so now. A disk that does not take it costs the run nothing."""
         now, clock = time.time(), pace.clock()
         if not at_once and now - self.wrote < SILENT_S:
             return
-        running = [
-            {"rule": job.rule, "wildcards": dict(job.wildcards), "since": now - (clock - job.began)}
-            for job in list(pace.running.values())
-        ]
-        command, _, folder = os.environ.get(COMMAND, shlex.join(["snakemake", *sys.argv[1:]])).partition("\n")
+        jobs = [] if self.ended else list(pace.running.values())
         record = {
-            "schema": 1,
-            "pid": os.getpid(),
-            **holding.machine(),
-            "started": holding.began(os.getpid()),
-            "command": command,
-            "folder": folder or str(Path.cwd()),
-            "scheduler": self.scheduler,
-            "began": self.began,
+            **self.about,
             "said": now,
             "ended": self.ended,
             "seconds_left": seconds_left,
             "doing": doing,
-            "running": [] if self.ended else running,
-            "failed": list(self.failed.values()),
+            "running": [asdict(Job(job.rule, dict(job.wildcards), now - (clock - job.began))) for job in jobs],
+            "failed": [asdict(job) for job in self.failed.values()],
         }
         self.wrote = now
         with contextlib.suppress(OSError):
             write_json(self.file, record)
-
-    def fail(self, output: str, rule: str, wildcards: Mapping[str, str], words: str, log: str) -> None:
-        self.failed[output] = {
-            "rule": rule,
-            "wildcards": dict(wildcards),
-            "since": time.time(),
-            "words": words,
-            "log": log,
-        }
 
 
 def read(folder: Path) -> Run | None:

@@ -92,51 +92,55 @@ class Needs:
     def __init__(self, study: Any, settings: Any, size: Callable[[str], Size | None], gpu: Callable[[str], int]):
         self.study, self.settings, self._size, self._gpu = study, settings, size, gpu
 
-    def _of_a_cell(self, wildcards: Any) -> tuple[Size | None, BackendEntry, bool]:
+    def _asked(self, wildcards: Any, attempt: int, needed: Callable[[Size], float]) -> int:
+        """What is needed for a scene of this size, and more after a failure."""
+        size = self._size(wildcards.scene)
+        return doubled(needed(size), attempt) if size else 1
+
+    def _trainer(self, wildcards: Any) -> tuple[BackendEntry, bool]:
+        """The cell's entry of the study, and whether its trainer runs on a GPU."""
         entry = self.study.backend(wildcards.backend)
-        return self._size(wildcards.scene), entry, bool(self._gpu(entry.backend))
+        return entry, bool(self._gpu(entry.backend))
 
     def train_mb(self, wildcards: Any, attempt: int) -> int:
-        size, entry, gpu = self._of_a_cell(wildcards)
+        entry, gpu = self._trainer(wildcards)
         ratio = 1.0 if wildcards.selector == REFERENCE else float(wildcards.ratio)
-        return doubled(train_mb(size, entry, ratio, gpu), attempt) if size else 1
+        return self._asked(wildcards, attempt, lambda size: train_mb(size, entry, ratio, gpu))
 
     def train_minutes(self, wildcards: Any, attempt: int) -> int:
-        size, entry, gpu = self._of_a_cell(wildcards)
+        entry, gpu = self._trainer(wildcards)
         command = self.settings.command.get(entry.backend.removeprefix("command:"))
         timeout = command.timeout if command and entry.backend.startswith("command:") else 0
-        return doubled(train_minutes(size, entry, gpu, timeout), attempt) if size else 1
+        return self._asked(wildcards, attempt, lambda size: train_minutes(size, entry, gpu, timeout))
 
     def evaluate_mb(self, wildcards: Any, attempt: int) -> int:
-        size, entry, gpu = self._of_a_cell(wildcards)
-        return doubled(evaluate_mb(size, entry, gpu), attempt) if size else 1
+        entry, gpu = self._trainer(wildcards)
+        return self._asked(wildcards, attempt, lambda size: evaluate_mb(size, entry, gpu))
 
     def evaluate_minutes(self, wildcards: Any, attempt: int) -> int:
-        size, entry, _ = self._of_a_cell(wildcards)
-        return doubled(evaluate_minutes(size, entry), attempt) if size else 1
+        entry, _ = self._trainer(wildcards)
+        return self._asked(wildcards, attempt, lambda size: evaluate_minutes(size, entry))
 
     def select_mb(self, wildcards: Any, attempt: int) -> int:
-        size = self._size(wildcards.scene)
-        return doubled(1000 + 24e3 * size.views / MB, attempt) if size else 1
+        return self._asked(wildcards, attempt, lambda size: 1000 + 24e3 * size.views / MB)
 
     def select_minutes(self, wildcards: Any, attempt: int) -> int:
-        size = self._size(wildcards.scene)
-        return doubled(min(5 + (size.views / 10_000) ** 2, DAY), attempt) if size else 1
+        return self._asked(wildcards, attempt, lambda size: min(5 + (size.views / 10_000) ** 2, DAY))
+
+    @property
+    def _large_encoder(self) -> bool:
+        return self.study.encoder.partition(":")[0] in LARGE_ENCODERS
 
     def features_mb(self, wildcards: Any, attempt: int) -> int:
-        size = self._size(wildcards.scene)
-        large = self.study.encoder.partition(":")[0] in LARGE_ENCODERS
-        read = 64 * size.width * size.height * self.settings.features.batch / MB if size else 0
-        return doubled((8000 if large else 2000) + read, attempt) if size else 1
+        least, batch = 8000 if self._large_encoder else 2000, self.settings.features.batch
+        return self._asked(wildcards, attempt, lambda size: least + 64 * size.width * size.height * batch / MB)
 
     def features_minutes(self, wildcards: Any, attempt: int) -> int:
-        size = self._size(wildcards.scene)
-        a_picture_s = 5 if self.study.encoder.partition(":")[0] in LARGE_ENCODERS else 1
-        return doubled(10 + a_picture_s * size.views / 60, attempt) if size else 1
+        a_picture_s = 5 if self._large_encoder else 1
+        return self._asked(wildcards, attempt, lambda size: 10 + a_picture_s * size.views / 60)
 
     def describe_mb(self, wildcards: Any, attempt: int) -> int:
-        size = self._size(wildcards.scene)
-        return doubled(1500 + 24e3 * size.views / MB, attempt) if size else 1
+        return self._asked(wildcards, attempt, lambda size: 1500 + 24e3 * size.views / MB)
 
     @staticmethod
     def fixed(value: int) -> Callable[..., int]:

@@ -71,6 +71,11 @@ class BackendEntry:
     options: dict[str, Any] = field(default_factory=dict)
     grid: dict[str, Any] = field(default_factory=dict)  # the part of the study's grid that it runs; empty for all
 
+    @property
+    def file_name(self) -> str:
+        """What files call its backend."""
+        return file_name(self.backend)
+
 
 @dataclass(frozen=True)
 class Study:
@@ -134,6 +139,11 @@ class Study:
         """What `results/STUDY/study.json` records; nothing in it depends on where the file of the study lies."""
         fields = {key: value for key, value in asdict(self).items() if key != "source"}
         return {"schema": 1, **fields, "cells": len(self.cells())}
+
+
+def file_name(backend: str) -> str:
+    """What files call a backend."""
+    return backend.replace(":", "-")
 
 
 def names() -> list[str]:

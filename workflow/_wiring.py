@@ -27,7 +27,7 @@ from ..scenes.whereabouts import absence, python_of, renderable, renders
 from ..selectors import _run
 from ._depends import Lists
 from ._resources import Needs, Size
-from ._study import Study
+from ._study import Study, file_name
 
 # Installed packages whose version may change a step's numbers; a backend's version names its own.
 CHOOSING = ("numpy", "scipy", "numba")
@@ -255,11 +255,11 @@ class Wiring:
     @cached_property
     def trainers(self) -> dict[str, str]:
         """The backends that train, each once however many names the study has for it, by what files call them."""
-        return {_file_name(entry.backend): entry.backend for entry in self.study.backends}
+        return {file_name(entry.backend): entry.backend for entry in self.study.backends}
 
     def warm(self, wildcards: Any) -> str:
         """The file that says that the cell's backend is compiled."""
-        return f"{self.results}/warm/{_file_name(self.study.backend(wildcards.backend).backend)}"
+        return f"{self.results}/warm/{file_name(self.study.backend(wildcards.backend).backend)}"
 
     @functools.cache  # noqa: B019
     def _facts(self, name: str) -> dict[str, Any]:
@@ -276,7 +276,7 @@ class Wiring:
         return self._training(self.trainers[wildcards.trainer])
 
     def _training(self, name: str) -> str:
-        step = f"train-{_file_name(name)}"
+        step = f"train-{file_name(name)}"
         if not self.lists.writes:
             return self.lists.path(step)
         facts = self._facts(name)
@@ -287,7 +287,7 @@ class Wiring:
     def scoring(self, wildcards: Any) -> str:
         """What a score depends on besides scene and model."""
         name = self.study.backend(wildcards.backend).backend
-        step = f"evaluate-{_file_name(name)}"
+        step = f"evaluate-{file_name(name)}"
         if not self.lists.writes:
             return self.lists.path(step)
         modules = ("workflow.commands.evaluate", *_evaluate.modules_of(name, self._backend(name)))
@@ -369,10 +369,6 @@ class _Cell:
 
     def __init__(self, cell: dict[str, str]):
         self.scene, self.selector, self.ratio, self.seed = (cell[key] for key in ("scene", "selector", "ratio", "seed"))
-
-
-def _file_name(backend: str) -> str:
-    return backend.replace(":", "-")
 
 
 def _contents(folder: Path) -> dict[str, str]:

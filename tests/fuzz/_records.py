@@ -502,7 +502,8 @@ def of_progress(root: Path) -> None:
 
     at_it = SimpleNamespace(rule="train", wildcards={key: str(value) for key, value in CELL.items()}, began=1.0)
     file = _progress_file.RunFile(root)
-    file.fail("a.json", "select", {"scene": "small", "selector": "uniform", "part": "0.5", "seed": "0"}, "why", "a.log")
+    needs = {"scene": "small", "selector": "uniform", "part": "0.5", "seed": "0"}
+    file.failed["a.json"] = _progress_file.Job("select", needs, 1.0, "why", "a.log")
     file.write(SimpleNamespace(clock=lambda: 2.0, running={"a": at_it}), 60.0, "1 of 2", at_once=True)
     with open(root / "held.json", "wb") as held:
         holding.write(held.fileno(), holding.me())
@@ -521,7 +522,7 @@ def opens_progress(given: Input) -> None:
     cells = _standing.standing(asked.study, given.root, SETTINGS, run)
     counts = _standing.counts(cells)
     _standing.beside(asked.study, run)
-    status._lines(asked.study, "one", run, cells, counts, None)
+    status._lines(asked.study, given.root, "one", run, cells, counts, None)
     json.dumps(status._record(asked.study, run, cells, counts, status._left(run)), allow_nan=False)
     if run is None:
         raise UserError("nothing is known of a run")
