@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -24,6 +25,15 @@ def known(value: T | None) -> T:
     """The value, which is there."""
     assert value is not None
     return value
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Waits for it, and fails when it does not come."""
+    for _ in range(900):
+        if condition():
+            return
+        time.sleep(0.1)
+    raise AssertionError("it did not come")
 
 
 @pytest.fixture(scope="session")

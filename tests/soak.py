@@ -177,19 +177,10 @@ class Soak:
 
     def start(self, variables: dict[str, str]) -> subprocess.Popen:
         """The user's command, in a session of its own."""
-        command = [sys.executable, "-m", "snakemake", "-j2", "--config", "study=mini", "--", "reports"]
         with open(self.log, "ab") as log:
             log.write(f"--- round {self.rounds}\n".encode())
-            return subprocess.Popen(
-                command,
-                cwd=self.clone.folder,
-                env=self.clone.environment(**variables),
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                preexec_fn=usual,
-            )
+            log.flush()
+            return self.clone.begin(log, **variables)
 
     def disturb(self, run: subprocess.Popen, kills: int, tracker: "Tracker | None") -> bool:
         """Kills up to so many of the run's processes at random; whether it came to its end and all was logged.
@@ -269,12 +260,6 @@ def is_of(kind: str, parent: int, line: str, run: subprocess.Popen) -> bool:
     if "_fork_server" in line:
         return kind == ("fork server" if parent == run.pid else "forked job")
     return "viewbench" in line and f" {kind} " in line and not line.startswith(("/bin/bash", "bash", "/bin/sh"))
-
-
-def usual() -> None:
-    """As a terminal starts a program, and not as a shell's background does."""
-    for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
 
 
 class Tracker:

@@ -82,6 +82,14 @@ def posed(folder: Path, names: list[str] | None = None, **keys: object) -> Path:
     return folder
 
 
+def leading_out(link: Path) -> Path:
+    """A folder beside the capture, to which `link` in the capture leads."""
+    outside = link.parents[1] / "outside"
+    outside.mkdir()
+    link.symlink_to("../outside")
+    return outside
+
+
 def edited(folder: Path, change: Callable[[dict], object]) -> None:
     """The capture's table as `change` leaves it."""
     table = json.loads((folder / "transforms.json").read_text())
@@ -265,9 +273,7 @@ def _(folder):
 )
 def _(folder):
     posed(folder)
-    (folder.parent / "outside").mkdir()
-    (folder.parent / "outside/precious").write_text(SECRET)
-    (folder / "subset").symlink_to("../outside")
+    (leading_out(folder / "subset") / "precious").write_text(SECRET)
 
 
 @attack(
@@ -277,8 +283,7 @@ def _(folder):
 )
 def _(folder):
     posed(folder)
-    (folder.parent / "outside").mkdir()
-    (folder / "features").symlink_to("../outside")
+    leading_out(folder / "features")
 
 
 @attack("settings in the capture", "info {scene}", "info .", says="may have come with it")

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.reports.mlflow_server import free_port
+from viewbench.backends._command_line import free_port
 
 PACKAGES = ("psycopg2-binary", "Flask-WTF")  # its driver, and what `mlflow server --app-name basic-auth` wants
 PATIENCE_S = 300

@@ -3,9 +3,11 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from tests.conftest import copy_package, environment_of
 
@@ -52,6 +54,20 @@ class Clone:
     def snakemake(self, *arguments: str, study: str = "mini", **variables: str) -> subprocess.CompletedProcess:
         return self.call("snakemake", "-j2", *arguments, "--config", f"study={study}", "--", "reports", **variables)
 
+    def begin(self, output: Any = subprocess.DEVNULL, **variables: str) -> subprocess.Popen:
+        """The same command begun and not waited for, in a session of its own, as a terminal's programs begin."""
+        command = [sys.executable, "-m", "snakemake", "-j2", "--config", "study=mini", "--", "reports"]
+        return subprocess.Popen(
+            command,
+            cwd=self.folder,
+            env=self.environment(**variables),
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            start_new_session=True,
+            preexec_fn=_usual,
+        )
+
     def run(self, **variables: str) -> str:
         """Runs the study to its end; returns what was printed."""
         done = self.snakemake(**variables)
@@ -73,6 +89,12 @@ class Clone:
         text = path.read_text(encoding="utf-8")
         assert old in text, f"{name} has no {old!r}"
         path.write_text(text.replace(old, new, 1) if old else text + new, encoding="utf-8")
+
+
+def _usual() -> None:
+    """As a terminal starts a program, and not as a shell's background does, where some signals are ignored."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def take_frames(room: Path, folder: Path, count: int) -> Path:

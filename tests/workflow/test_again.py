@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from tests.conftest import known
+from tests.conftest import known, until
 from viewbench.backends import _passing
 from viewbench.common.errors import PassingError, UserError
 from viewbench.common.settings import PACKAGE
@@ -113,14 +113,6 @@ def test_a_wait_can_be_stopped(place, small_room):
     process.communicate(timeout=60)
     assert process.returncode != 0
     assert begun(place) == 1
-
-
-def until(condition):
-    for _ in range(600):
-        if condition():
-            return
-        time.sleep(0.1)
-    raise AssertionError("it did not come")
 
 
 @pytest.mark.parametrize(

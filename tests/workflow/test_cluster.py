@@ -26,11 +26,7 @@ from viewbench.workflow._study import BackendEntry
 
 PROFILE = PACKAGE / "workflow" / "profiles" / "slurm"
 LOCAL = {"study", "collect", "track_cell", "track", "report", "page", "reports"}
-SMALL = """
-scenes: [room_human]
-selectors: [uniform]
-ratios: [0.02]
-seeds: 2
+REST = """
 backends: [splat]
 width: 32
 budget: {iterations: 10}
@@ -38,18 +34,11 @@ encoder: none
 reference: false
 reports: [timing]
 """
-LARGE = """
-scenes: [room_human, room_smooth]
-selectors: [random, uniform, facility, maxmin, logdet]
-ratios: [0.03, 0.05, 0.1]
-seeds: 20
-backends: [splat]
-width: 32
-budget: {iterations: 10}
-encoder: none
-reference: false
-reports: [timing]
-"""
+SMALL = "scenes: [room_human]\nselectors: [uniform]\nratios: [0.02]\nseeds: 2" + REST
+LARGE = (
+    "scenes: [room_human, room_smooth]\nselectors: [random, uniform, facility, maxmin, logdet]\n"
+    "ratios: [0.03, 0.05, 0.1]\nseeds: 20" + REST
+)
 
 
 @pytest.fixture(scope="module")

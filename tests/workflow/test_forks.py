@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.conftest import copy_package, environment_of
+from tests.conftest import copy_package, environment_of, until
 from viewbench.workflow import _fork_client, _fork_server
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="jobs are forked on Linux alone")
@@ -77,15 +77,6 @@ def begin(package, tmp_path) -> Callable[..., subprocess.Popen]:
         return subprocess.Popen(command, cwd=tmp_path, env=environment, preexec_fn=before or usual, **pipes)
 
     return popen
-
-
-def until(condition: Callable[[], bool]) -> None:
-    """Waits for it, and fails when it does not come."""
-    for _ in range(600):
-        if condition():
-            return
-        time.sleep(0.1)
-    raise AssertionError("it did not come")
 
 
 def ended(pid: int) -> bool:

@@ -1,6 +1,5 @@
 """`viewbench status`: while a study runs, when it was killed, when cells have failed, and when all are done."""
 
-import functools
 import json
 import os
 import shutil
@@ -8,14 +7,12 @@ import signal
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from tests.conftest import ROOM
+from tests.conftest import ROOM, until
 from tests.workflow.clones import Clone, take_frames
 from viewbench.common import settings as settings_file
 from viewbench.workflow import _pace, _progress_file, _standing, _study
@@ -92,26 +89,6 @@ def said(clone: Clone) -> str:
     return clone.call("viewbench", "status", "mini").stdout
 
 
-def begun(clone: Clone) -> subprocess.Popen:
-    """The study, in a process group of its own, with SIGINT as a terminal's programs have it."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "snakemake", "-j2", "--config", "study=mini", "--", "reports"],
-        cwd=clone.folder,
-        env=clone.environment(),
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-        preexec_fn=functools.partial(signal.signal, signal.SIGINT, signal.default_int_handler),
-    )
-
-
-def until(condition: Callable[[], bool]) -> None:
-    for _ in range(900):
-        if condition():
-            return
-        time.sleep(0.1)
-    raise AssertionError("it did not come")
-
-
 def test_the_life_of_a_study(clone):
     """Before, while it runs, killed, failed, and done."""
     place = clone.folder.parent
@@ -121,7 +98,7 @@ def test_the_life_of_a_study(clone):
 
     for name in ("slow", "cross"):
         (place / name).touch()
-    run = begun(clone)
+    run = clone.begin()
     try:
         until(lambda: any(cell["cell"].startswith("command-moody/") for cell in running(clone)))
         code, found = status(clone)
@@ -140,20 +117,16 @@ def test_the_life_of_a_study(clone):
     assert f"there is no '{place / 'mini'}' here" in elsewhere.stdout
     assert sum(found["counts"].values()) == 6
 
-    if (
-        signal.getsignal(signal.SIGINT) != signal.SIG_IGN
-    ):  # as in the background of a shell, where nobody presses Ctrl-C
-        (place / "training").unlink()
-        run = begun(clone)
-        try:
-            until((place / "training").exists)
-            until(lambda: bool(running(clone)))
-        finally:
-            os.killpg(run.pid, signal.SIGINT)
-            run.wait()
-        code, found = status(clone)
-        assert (code, found["counts"]["failed"], found["run"]["ended"]) == (3, 0, "stopped"), found
-        assert "the last run was stopped" in said(clone)
+    run = clone.begin()
+    try:
+        # Both jobs at once wait in the trainer, so that none is stopped while it still begins.
+        until(lambda: [cell["cell"].split("/")[0] for cell in running(clone)] == 2 * ["command-moody"])
+    finally:
+        os.killpg(run.pid, signal.SIGINT)
+        run.wait()
+    code, found = status(clone)
+    assert (code, found["counts"]["failed"], found["run"]["ended"]) == (3, 0, "stopped"), found
+    assert "the last run was stopped" in said(clone)
 
     (place / "slow").unlink()
     assert clone.snakemake().returncode != 0
