@@ -57,9 +57,10 @@ dev: $(VENV)/.installed-dev
 reports: setup
 	@$(THREADS) $(BIN)/snakemake -j$(JOBS) --config study=$(STUDY) -- reports
 	@echo "Open results/$(notdir $(basename $(STUDY)))/reports/index.html"
+	@$(BIN)/viewbench dashboard $(STUDY) --links 2> /dev/null || true
 
 dashboard: setup
-	$(BIN)/mlflow server --backend-store-uri sqlite:///results/mlflow.db --host 127.0.0.1 --port 5000
+	@$(BIN)/viewbench dashboard
 
 test: dev packages lint types pytest
 

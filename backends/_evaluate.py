@@ -14,6 +14,7 @@ from ..common import gpu, plugins, threads
 from ..common.errors import UserError
 from ..common.files import finite_or_none, read_json, sealed, sha256_file, unsealed, write_json
 from ..common.holding import alone
+from ..common.provenance import now
 from ..common.settings import Settings
 from ..common.sources import code_sha256
 from ..scenes.digest import scene_sha256
@@ -109,6 +110,7 @@ def evaluate(
             "configuration": _registry.configuration_of(backend)["render"],
             "drawn_by": _registry.drawn_by(train["backend"], backend),
             "viewbench": __version__,
+            "ended": now(),
         }
         record = sealed(record)
         write_json(out / "metrics.json", record)

@@ -18,7 +18,7 @@ from ..common import plugins, threads
 from ..common.errors import PassingError, UserError, nearest
 from ..common.files import read_json, sealed, sha256_folder, write_json
 from ..common.holding import alone
-from ..common.provenance import commit, machine
+from ..common.provenance import commit, machine, now
 from ..common.rng import seed_of
 from ..common.settings import Settings
 from ..common.sources import code_sha256
@@ -55,6 +55,7 @@ def train(
     scene, a folder that another process is writing, and whatever the backend refuses; PassingError
     where memory was short.
     """
+    began = now()
     threads.allow(settings.compute.threads)
     backend = _registry.load(job.backend, settings)
     lease = _registry.hold_gpu(backend, settings)
@@ -119,6 +120,7 @@ def train(
         record = _record(trained, asked, selection, sha256_folder(work / "model"))
         record["bytes"] = {name: (work / "model" / name).stat().st_size for name in record["files"]}
         record["gpu"] = None if lease is None else lease.record()
+        record["began"] = began
         _replace_model(work / "model", out)
         write_json(out / "selection.json", sealed(selection))
         record = sealed(record)

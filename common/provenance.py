@@ -1,11 +1,17 @@
-"""What made a result: the commit of viewbench and the machine."""
+"""What made a result, and when: the commit of viewbench, the machine, and its clock."""
 
 import functools
 import os
 import platform
 import subprocess
+from datetime import UTC, datetime
 
 from .settings import PACKAGE
+
+
+def now() -> str:
+    """The time in UTC by this machine's clock, ISO 8601 with milliseconds."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 @functools.cache

@@ -67,7 +67,8 @@ class Metrics:
 class Tracking:
     uri: str = "sqlite:///results/mlflow.db"
     artifacts: str = "results/mlartifacts"
-    renders: int = 3
+    renders: int = 3  # test views of a cell whose strips are logged; 0 for no pictures
+    models: int = 10  # megabytes of a model that is logged with its cell; 0 for none
     patience: int = 120  # seconds that the end of a study waits for a store that does not answer
 
 
@@ -117,6 +118,11 @@ class Settings:
         if path.is_absolute():
             return path
         return at_home(self.data.root) / path if self.data.root else None
+
+    def place_of(self, scene: str) -> str:
+        """Where a scene lies, as the file writes it; its name where the file does not know it."""
+        entry = self.entry(scene)
+        return entry.path if entry else scene
 
     def dataset_of(self, scene: str, otherwise: str) -> str:
         """The group that tables put a scene in; `otherwise` where the file names none."""
@@ -175,7 +181,7 @@ SECTIONS: dict[str, type] = {
     "instant_ngp": InstantNgp,
 }
 # No renders, no waiting, no limit, the first model, no other attempt.
-MAY_BE_ZERO = ("renders", "patience", "timeout", "model", "retries", "retry_wait")
+MAY_BE_ZERO = ("renders", "models", "patience", "timeout", "model", "retries", "retry_wait")
 TABLES: dict[str, type] = {"scenes": SceneEntry, "command": Command}
 
 

@@ -51,10 +51,11 @@ def build(study_dir: Path) -> Path:
     )
     html = environment.get_template("page.html").render(
         study=study,
-        headline=[_tied(sentence) for sentence in _rooms.headline(study) or _findings.headline(study)],
+        headline=[_tied(sentence) for sentence in verdict(study)],
         details=[_tied(sentence) for sentence in _findings.details(study)],
         grid=_grid_words(study),
         facts=_facts(study),
+        dashboard=_stamp(study.folder).get("figure", ""),
         sections=sections,
         failures=_failures(study),
         style=(TEMPLATES / "page.css").read_text(encoding="utf-8"),
@@ -63,6 +64,11 @@ def build(study_dir: Path) -> Path:
     path = out / "index.html"
     write_text(path, html)
     return path
+
+
+def verdict(study: Study) -> list[str]:
+    """What came out of the study, in sentences, each with its interval."""
+    return _rooms.headline(study) or _findings.headline(study)
 
 
 def _sections(study: Study, out: Path) -> list[Section]:
@@ -133,12 +139,17 @@ def _facts(study: Study) -> list[tuple[str, str]]:
 
 def _tracking_words(folder: Path) -> str:
     """Why the cells were not logged, where they were not; the next run tries again."""
+    skipped = _stamp(folder).get("skipped", "")
+    return f"not logged: {skipped}" if skipped else ""
+
+
+def _stamp(folder: Path) -> dict[str, Any]:
+    """What logging the cells left; empty where they were not offered."""
     stamps = [path for name in ("tracked", "tracked.partial") if (path := folder / f"{name}.json").is_file()]
     if not stamps:
-        return ""
+        return {}
     record = read_json(max(stamps, key=lambda path: path.stat().st_mtime_ns), "stamp of tracking")
-    skipped = record.get("skipped", "") if isinstance(record, dict) else ""
-    return f"not logged: {skipped}" if skipped else ""
+    return record if isinstance(record, dict) else {}
 
 
 def _grid_words(study: Study) -> str:

@@ -1,103 +1,128 @@
-"""What MLflow is told of one cell: tags, parameters, metrics with the curve of the training, and files."""
+"""What MLflow is told in one run, and the requests that tell it."""
 
 import hashlib
-import math
+import json
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..common.cells import AXES, RECORDS, cell_name, figures, read_records
-
-CELL, FINGERPRINT, WRITER = "viewbench.cell", "viewbench.fingerprint", "viewbench.writer"
+KIND = "viewbench.kind"  # one of the three below
+CELL, SUMMARY, REPORT = "viewbench.cell", "viewbench.summary", "viewbench.report"  # tags with a name, by kind
+KINDS = {"cell": CELL, "summary": SUMMARY, "report": REPORT}
+FINGERPRINT, WRITER, POINTS = "viewbench.fingerprint", "viewbench.writer", "viewbench.points"
+# MLflow's own tags (mlflow/utils/mlflow_tags.py, and constants.ts of its page for the colour).
+PARENT, COLOUR, USER = "mlflow.parentRunId", "mlflow.runColor", "mlflow.user"
+SOURCE, SOURCE_TYPE, COMMIT, DIRTY = (
+    "mlflow.source.name",
+    "mlflow.source.type",
+    "mlflow.source.git.commit",
+    "mlflow.source.git.dirty",
+)
 LONGEST = 6000  # letters of a parameter that MLflow takes
+LONGEST_DIGEST = 16  # letters of a data set's digest that people compare
+
+Number = tuple[str, float, int, int]  # name, value, time stamp in milliseconds since 1970, step
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """A scene as MLflow lists it beside a run; `digest` begins the scene's hash."""
+
+    name: str
+    digest: str
+    place: str
+    profile: dict[str, Any]  # numbers by what they count
 
 
 @dataclass(frozen=True)
 class Content:
-    """A run as it is logged; `files` are pairs of a path and a folder among the artifacts, None for the first one."""
+    """A run as it is logged; `files` are pairs of a path and a folder among the artifacts, None for the first one.
 
+    Those of `linked` are as good as immutable: where artifacts lie on the same file system they take no room.
+    """
+
+    kind: str
+    key: str  # what is unique among the runs of its kind
     name: str
     tags: dict[str, str]
     params: dict[str, str]
-    metrics: list[tuple[str, float, int, int]]  # name, value, time stamp in milliseconds, step
-    files: list[tuple[Path, str | None]]
+    metrics: Sequence[Number]
+    started_ms: int
+    ended_ms: int
+    files: Sequence[tuple[Path, str | None]] = ()
+    linked: Sequence[tuple[Path, str | None]] = ()
+    data: DataSet | None = None
+    of_data: str = "train"  # what the run did with it
+    also: dict[str, str] = field(default_factory=dict)  # tags that are set with the rest, and are no part of the hash
+
+    def fingerprint(self, *more: object) -> str:
+        """Hash of what makes two runs differ for whoever looks at them, but for numbers and files: see `more`."""
+        told = [self.kind, self.key, self.name, sorted(self.tags.items()), sorted(self.params.items()), *more]
+        return hashlib.sha256(json.dumps(told, default=str).encode()).hexdigest()
 
 
-def fingerprint(folder: Path) -> str:
-    """Hash of a cell's files; raises OSError where one is missing."""
-    digest = hashlib.sha256()
-    for name in RECORDS:
-        digest.update((folder / name).read_bytes() + b"\0")
-    return digest.hexdigest()
-
-
-def content(cell: dict[str, str], folder: Path, renders: int) -> Content:
-    """What is logged of the cell, with so many of its renders; raises UserError for a file that cannot be read."""
-    selection, train, metrics = read_records(folder)
-    tags = {
-        CELL: cell_name(cell),
-        "commit": train["commit"],
-        "backend": cell["backend"],
-        "backend_version": train["version"],
-        "device": train["device"],
-        "viewbench": train.get("viewbench", ""),
-    }
-    values = {**cell, "count": selection["count"], "n_views": selection["n_views"], "width": train.get("width")}
-    values |= {f"budget.{key}": value for key, value in train["budget"].items()}
-    values |= {f"option.{key}": value for key, value in train.get("options", {}).items()}
-    values |= {f"selector.{key}": value for key, value in selection["parameters"].items()}
-    params = {key: str(value)[:LONGEST] for key, value in values.items() if value is not None}
-    final = {**figures(selection, train, metrics), "n_primitives": train["n_primitives"]}
-    logged = [(key, value, 0, 0) for key, value in final.items() if _is_number(value)]
-    files: list[tuple[Path, str | None]] = [(folder / name, None) for name in RECORDS]
-    files += [(path, "renders") for path in _samples(metrics, folder, renders)]
-    name = "/".join(cell[key] for key in AXES[1:])
-    return Content(name, tags, params, logged + _curve(train["curve"]), files)
+def params(values: dict[str, Any]) -> dict[str, str]:
+    """Values as MLflow takes them; those that are None are left out."""
+    return {key: str(value)[:LONGEST] for key, value in values.items() if value is not None}
 
 
 def write(client: Any, experiment: str, told: Content, tags: dict[str, str], made: Callable[[str], None]) -> str:
     """Logs a run with `tags` besides its own, calls `made` with its id as soon as it has one, and ends it.
 
     The run is finished when all of it is there, and not before. As few requests as MLflow's limits allow: one to begin
-    it, one for up to 1000 numbers, one a file, one to end it.
+    it, one for up to 1000 numbers, one for its data set, one a file, one to end it.
     """
     from mlflow.entities import Metric, Param
     from mlflow.store.artifact.artifact_repository_registry import get_artifact_repository
 
-    run = client.create_run(experiment, tags=told.tags | tags, run_name=told.name).info
+    own = {KIND: told.kind, KINDS[told.kind]: told.key, **told.tags, **told.also}
+    begun = client.create_run(experiment, start_time=told.started_ms, tags=own | tags, run_name=told.name)
+    run = begun.info
     made(run.run_id)
-    params = [Param(key, value) for key, value in told.params.items()]
-    # The client itself cuts this into requests of at most 1000 metrics and 100 parameters.
-    client.log_batch(run.run_id, metrics=[Metric(*metric) for metric in told.metrics], params=params)
+    if told.metrics or told.params:
+        # The client itself cuts this into requests of at most 1000 metrics and 100 parameters.
+        client.log_batch(
+            run.run_id,
+            metrics=[Metric(*metric) for metric in told.metrics],
+            params=[Param(key, value) for key, value in told.params.items()],
+        )
+    if told.data:
+        client.log_inputs(run.run_id, datasets=[_input(told.data, told.of_data)])
     # What client.log_artifact does, without asking for the run again to learn where its artifacts go.
     store = get_artifact_repository(run.artifact_uri, tracking_uri=client.tracking_uri)
     for path, where in told.files:
         store.log_artifact(os.fspath(path), where)
-    client.set_terminated(run.run_id, "FINISHED")
+    for path, where in told.linked:
+        if not _link(store, path, where):
+            store.log_artifact(os.fspath(path), where)
+    client.set_terminated(run.run_id, "FINISHED", end_time=told.ended_ms)
     return run.run_id
 
 
-def _curve(points: list[dict[str, Any]]) -> list[tuple[str, float, int, int]]:
-    """By step, and with the elapsed time as the time stamp and as a step of its own."""
-    curve = []
-    for point in points:
-        stamp = round(1000 * (point["seconds"] or 0))
-        for key, metric in (("loss", "train/loss"), ("test_psnr_db", "train/test_psnr_db")):
-            if _is_number(point.get(key)):
-                curve.append((metric, point[key], stamp, int(point["step"])))
-                curve.append((f"{metric}_by_ms", point[key], stamp, stamp))
-    return curve
+def _link(store: Any, path: Path, where: str | None) -> bool:
+    """Whether the file is among the artifacts as a second name of itself, which takes no room."""
+    folder = getattr(store, "artifact_dir", None)  # of a LocalArtifactRepository
+    if folder is None:
+        return False
+    try:
+        target = Path(folder) / (where or "")
+        target.mkdir(parents=True, exist_ok=True)
+        (target / path.name).hardlink_to(path)
+    except OSError:
+        return False
+    return True
 
 
-def _samples(metrics: dict, folder: Path, count: int) -> list[Path]:
-    views = metrics["views"]
-    if not count or not views:
-        return []
-    files = [folder / view["file"] for view in views[:: max(1, len(views) // count)][:count] if "file" in view]
-    return [file for file in files if file.is_file()]
+def _input(data: DataSet, context: str) -> Any:
+    from mlflow.entities import Dataset, DatasetInput, InputTag
 
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    given = Dataset(
+        name=data.name,
+        digest=data.digest,
+        source_type="local",
+        source=json.dumps({"uri": data.place}),
+        profile=json.dumps(data.profile),
+    )
+    return DatasetInput(given, [InputTag("mlflow.data.context", context)])

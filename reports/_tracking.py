@@ -1,16 +1,17 @@
-"""Copies a study's cells into MLflow: one experiment a study, one finished run a cell, however often it is repeated.
+"""Copies a study into MLflow: one experiment a study, one finished run a cell, however often it is repeated.
 
 The JSON files are the truth and MLflow the window on them. Each run carries a fingerprint of its cell's files: a run
 with the same fingerprint is left alone, any other run of the cell (changed files, a crash half-way) is replaced
-(`_tracking_log.py`). A study goes on without its log: each cell is offered once, and the end of the study takes up what
-is missing.
+(`_tracking_log.py`). Cells are the children of summaries, which draw the paper's Figure 4 (`_tracked_summary.py`). A
+study goes on without its log: `_tracking_follow.py` offers each cell once, and the end of the study takes up what is
+missing.
 """
 
 import contextlib
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,89 +19,89 @@ from ..common.cells import AXES, RECORDS, cell_folder, cell_name
 from ..common.errors import UserError
 from ..common.settings import Tracking
 from . import _tracking_errors, _tracking_sqlite
+from ._about import About
+from ._tracked_cell import Cells, StudyCells
 from ._tracked_run import CELL, FINGERPRINT
-from ._tracking_away import Away
+from ._tracked_study import Tracked
+from ._tracked_summary import by_group, key_of
 from ._tracking_errors import Kind, masked
 from ._tracking_log import Log, is_remote
 
-__all__ = ["CELL", "FINGERPRINT", "KEY", "NO_TRACKING", "is_remote", "local_uri", "track", "track_cell"]
+__all__ = ["CELL", "FINGERPRINT", "KEY", "NO_TRACKING", "is_remote", "local_uri", "track"]
 KEY = AXES
 NO_TRACKING = "tracking.uri is empty"  # why nothing is logged where nobody wants it
 STRIKES = 5  # tries of a cell that a server in trouble does not take, while it answers otherwise
 DOUBTED = 4  # times that a refused user asks again: MLflow's server says 401, too, where its database is in trouble
 PAUSES_S = (1, 2, 4, 8, 15)  # between asking a store that is away; the last one again and again
-# Seconds of MLflow's own patience with one request, and how often it repeats it: a study logs hundreds of runs. A job
-# of one cell gives up sooner, since the end of the study logs what it did not.
-TIMEOUT_S, RETRIES, RETRIES_OF_ONE = 20, 2, 1
+# Seconds of MLflow's own patience with one request, and how often it repeats it: a study logs hundreds of runs.
+TIMEOUT_S, RETRIES = 20, 2
 QUIET = ("alembic", "mlflow.store.db.utils")  # log what is said in a sentence here
 Progress = Callable[[int, int | None, str], None]
 T = TypeVar("T")
 
 
 def track(
-    study: str,
-    cells: list[dict[str, str]],
+    about: About,
+    cells: Sequence[Mapping[str, str]],
     results: Path,
     tracking: Tracking,
     progress: Progress = lambda done, total, text: None,
     say: Callable[[str], None] = lambda text: None,
-) -> dict[str, int]:
-    """Logs the cells of one study; returns how many runs were "logged" and how many were "kept".
+) -> dict[str, int | str]:
+    """Logs the cells of one study and their summaries; returns how many runs of cells were "logged" and "kept", and
+    the id of the "experiment".
 
     `cells` are rows of the grid (KEY as texts), `results` is results/STUDY. Cells without all their files are left
     out. Removes what crashes have left in the experiment. Waits up to `tracking.patience` seconds, each time anew, for
     a store that does not answer. Raises UserError when some cells were not taken: repeat the call.
     """
-    away = Away(results, masked(tracking.uri))
+    ready = [cell for cell in cells if all((cell_folder(results, cell) / name).is_file() for name in RECORDS)]
+    return put(about, ready, StudyCells(about, results, tracking), tracking, progress, say)
+
+
+def put(
+    about: About,
+    ready: Sequence[Mapping[str, str]],
+    source: Cells,
+    tracking: Tracking,
+    progress: Progress = lambda done, total, text: None,
+    say: Callable[[str], None] = lambda text: None,
+    verdict: Sequence[str] = (),
+) -> dict[str, int | str]:
+    """What `track` does with the cells that are `ready`, wherever they come from."""
     patience = _Patience(tracking, say)
     done, refused = {"logged": 0, "kept": 0}, []
-    ready = [cell for cell in cells if all((cell_folder(results, cell) / name).is_file() for name in RECORDS)]
-    with _explained(tracking.uri):
-        log = _open(study, tracking, RETRIES, tracking.patience)
-        known = patience.ask(log.start)
-        away.over()
-        for number, cell in enumerate(ready):
-            name = cell_name(cell)
+    with explained(tracking.uri):
+        log = open_log(about.name, tracking, RETRIES, tracking.patience)
+        patience.ask(log.start)
+        tracked = Tracked(about, source, log)
+        patience.ask(lambda: tracked.describe(verdict))
+
+        def offer(name: str, what: Callable[[], T]) -> T | None:
             try:
-                new = patience.ask(
-                    lambda: log.cell(cell, cell_folder(results, cell), known.get(cell_name(cell), [])),  # noqa: B023
-                    log.answers,
-                )
-                done["logged" if new else "kept"] += 1
+                return patience.ask(what, log.answers)
             except (UserError, *_tracking_errors.errors()) as error:
                 if _tracking_errors.kind(error) is not Kind.CELL:
                     raise
                 refused.append(f"{name}: {_tracking_errors.words(error, tracking.uri)}")
+                return None
+
+        taken = []
+        for number, cell in enumerate(ready):
+            name = cell_name(cell)
+            new = offer(name, lambda: tracked.cell(cell))  # noqa: B023
+            if new is not None:
+                taken.append(cell)
+                done["logged" if new else "kept"] += 1
             progress(number + 1, len(ready), name)
+        for group, members in by_group(taken).items():
+            offer(key_of(group), lambda: tracked.summary(group, members))  # noqa: B023
     if refused:
         raise UserError(
             f"MLflow at '{masked(tracking.uri)}' took {sum(done.values())} of {len(ready)} cells, first without "
             f"{refused[0]}"
         )
-    return done
-
-
-def track_cell(study: str, cell: dict[str, str], results: Path, tracking: Tracking) -> dict[str, int]:
-    """Logs one cell while the study goes on; returns what `track` does.
-
-    Raises UserError at once where a job before this one found nobody (`_tracking_away.py`), and after a short while
-    where this one does: `track` at the end of the study takes up what is missing.
-    """
-    away = Away(results, masked(tracking.uri))
-    since_s = away.since_s()
-    if since_s is not None:
-        raise UserError(f"MLflow at '{masked(tracking.uri)}' was away {since_s:.0f} s ago, so it was not asked")
-    with _explained(tracking.uri):
-        try:
-            log = _open(study, tracking, RETRIES_OF_ONE, TIMEOUT_S)
-            known = log.start(cell_name(cell)).get(cell_name(cell), [])
-            new = log.cell(cell, cell_folder(results, cell), known, fresh=True)
-        except _tracking_errors.errors() as error:
-            if _tracking_errors.kind(error) is not Kind.CELL:
-                away.says(_tracking_errors.words(error, tracking.uri))
-            raise
-    away.over()
-    return {"logged": int(new), "kept": int(not new)}
+    return {**done, "experiment": log.experiment}
 
 
 def local_uri(uri: str) -> str:
@@ -112,7 +113,7 @@ def local_uri(uri: str) -> str:
     return f"{_tracking_sqlite.PREFIX}{path}"
 
 
-def _open(study: str, tracking: Tracking, retries: int, wait_s: float) -> Log:
+def open_log(study: str, tracking: Tracking, retries: int, wait_s: float) -> Log:
     """The log of a study, without a request; waits so long for a file that is locked."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("DO_NOT_TRACK", "true")
@@ -136,7 +137,7 @@ def _open(study: str, tracking: Tracking, retries: int, wait_s: float) -> Log:
 
 
 @contextlib.contextmanager
-def _explained(uri: str) -> Iterator[None]:
+def explained(uri: str) -> Iterator[None]:
     """Errors of MLflow become UserError."""
     try:
         yield

@@ -1,28 +1,33 @@
 """One study's experiment in MLflow, which any number of processes write to at once, be they killed or not heard.
 
-Who ends a run looks for others of its cell, and all writers keep the same one. Requests whose answer was lost, and
-which MLflow's client therefore repeats, leave runs that nobody knows: they carry the mark of their writer, who removes
-them. What a killed writer leaves is removed by whoever begins next.
+A run has a kind and a key (`_tracked_run.py`), and there is one finished run of each in the end. Who ends a run looks
+for others of its key, and all writers keep the same one. Requests whose answer was lost, and which MLflow's client
+therefore repeats, leave runs that nobody knows: they carry the mark of their writer, who removes them. What a killed
+writer leaves is removed by whoever begins next.
 """
 
+import contextlib
+import hashlib
+import json
 import uuid
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..common.cells import cell_name
 from ..common.errors import UserError
 from ..common.settings import Tracking
 from . import _tracked_run, _tracking_errors
-from ._tracked_run import CELL, FINGERPRINT, WRITER
+from ._tracked_run import FINGERPRINT, KIND, KINDS, PARENT, POINTS, WRITER, Content, Number
 from ._tracking_errors import Kind
 
-TRIES = 10  # of a cell, whose run others took for one that a crash had left
+TRIES = 10  # of a run that others took for one that a crash had left
+
+Key = tuple[str, str]  # kind, and what is unique among its runs
 
 
 def is_remote(uri: str) -> bool:
-    """Whether runs are logged to a server, cell by cell, rather than into a file beside the results."""
+    """Whether runs are logged to a server rather than into a file beside the results."""
     return uri.startswith(("http://", "https://"))
 
 
@@ -34,7 +39,9 @@ class Run:
     finished: bool
     fingerprint: str
     writer: str
-    started: int  # milliseconds since 1970, by the clock of its writer
+    started: int  # milliseconds since 1970
+    parent: str = ""
+    points: Mapping[str, str] = field(default_factory=dict)  # of a summary: digests by ratio
 
 
 class _GoneError(Exception):
@@ -47,100 +54,167 @@ class Log:
     def __init__(self, client: Any, uri: str, study: str, tracking: Tracking):
         self.client, self.uri, self.study, self.tracking = client, uri, study, tracking
         self.experiment, self.writer = "", uuid.uuid4().hex
+        self.tags: dict[str, str] = {}  # of the experiment
+        self.created_ms = 0  # since 1970
+        self.runs: dict[Key, list[Run]] = {}  # the finished ones, as far as this process knows
 
     def answers(self) -> None:
         """Raises what MLflow does when the store is away."""
         self.client.get_experiment_by_name(self.study)
 
-    def start(self, name: str | None = None) -> dict[str, list[Run]]:
-        """The finished runs by cell, of cell `name` alone where it is given; those that crashes have left are removed.
+    def start(self) -> None:
+        """Learns of the runs that are there; those that crashes have left are removed.
 
         A live writer's run may be among these: it finds out, and begins another one.
         """
-        self.experiment = self._experiment()
-        runs = self._runs(name)
+        self._find_experiment()
+        runs = self._search("")
         self._delete(run for found in runs.values() for run in found if not run.finished)
-        return {name: [run for run in found if run.finished] for name, found in runs.items()}
+        self.runs = {key: [run for run in found if run.finished] for key, found in runs.items()}
 
-    def cell(self, cell: dict[str, str], folder: Path, known: list[Run], fresh: bool = False) -> bool:
-        """Makes the cell have one finished run, that of its files; whether it had none before.
+    def describe(self, tags: Mapping[str, str]) -> None:
+        """Sets tags of the experiment, those that it does not have yet."""
+        from mlflow.exceptions import MlflowException
 
-        `known` are its finished runs as `start` returned them, `fresh` where that was a moment ago.
+        for key, value in tags.items():
+            if self.tags.get(key) == value:
+                continue
+            try:
+                self.client.set_experiment_tag(self.experiment, key, value)
+            except MlflowException as error:  # two who set a tag that is not there do not both succeed
+                if _tracking_errors.kind(error) is not Kind.CELL:
+                    raise
+                self.client.set_experiment_tag(self.experiment, key, value)
+            self.tags[key] = value
+
+    def put(self, key: Key, fingerprint: Callable[[], str], told: Callable[[], Content]) -> bool:
+        """Makes the key have one finished run, that of the fingerprint; whether it had none before.
+
+        Both are asked again where what they are made from has changed meanwhile.
         """
-        name, new = cell_name(cell), False
-        for attempt in range(TRIES):
-            now = _fingerprint(folder, name)
-            if not (fresh and not attempt) and not any(run.fingerprint == now for run in known):
-                known = self._finished(name)  # others may have been here since
+        known, new = self.runs.get(key, []), False
+        for _ in range(TRIES):
+            now = fingerprint()
             if not any(run.fingerprint == now for run in known):
-                told = _content(cell, folder, self.tracking.renders)
+                known = self._finished(key)  # others may have been here since
+            if not any(run.fingerprint == now for run in known):
                 try:
-                    self._write(told, {FINGERPRINT: now, WRITER: self.writer})
+                    self._write(told(), {FINGERPRINT: now, WRITER: self.writer})
                 except _GoneError:
                     continue
-                new, known = True, self._finished(name)
+                new, known = True, self._finished(key)
             current = [run for run in known if run.fingerprint == now]
-            if not current or _fingerprint(folder, name) != now:
-                continue  # the cell was made anew meanwhile, or somebody removed the run just made
+            if not current or fingerprint() != now:
+                continue  # it was made anew meanwhile, or somebody removed the run just made
             keep = min(current, key=lambda run: (run.started, run.id))
             self._delete(run for run in known if run is not keep)
+            self.runs[key] = [keep]
             return new
-        raise UserError(f"other writers removed the run of {name} {TRIES} times")
+        raise UserError(f"other writers removed the run of {key[1]} {TRIES} times")
 
-    def _write(self, told: _tracked_run.Content, tags: dict[str, str]) -> None:
-        made = ""
+    def known(self, key: Key) -> Run | None:
+        """The finished run of the key, as far as this process knows."""
+        return next(iter(self.runs.get(key, [])), None)
 
-        def note(run_id: str) -> None:
-            nonlocal made
-            made = run_id
+    def add(self, key: Key, points: Mapping[str, Sequence[Number]], ended_ms: int) -> bool:
+        """Adds the points, by ratio, that the summary does not have; False, and nothing is added, where it has others
+        than these, or another writer has removed it.
 
+        Repeating it does no harm: MLflow has each number of a metric, step and time once.
+        """
+        from mlflow.entities import Metric, RunTag
+
+        run = self.runs[key][0]
+        told = {ratio: _digest(numbers) for ratio, numbers in points.items()}
+        if any(told.get(ratio) != known for ratio, known in run.points.items()):
+            return False
+        missing = [ratio for ratio in told if ratio not in run.points]
+        if missing:
+            numbers = dict.fromkeys(number for ratio in missing for number in points[ratio])
+            tag = RunTag(POINTS, json.dumps(told))
+            with self._unless_gone(run.id) as gone:
+                self.client.log_batch(run.id, metrics=[Metric(*number) for number in numbers], tags=[tag])
+                self.client.set_terminated(run.id, "FINISHED", end_time=ended_ms)
+            if gone:
+                return False
+            self.runs[key] = [replace(run, points=told)]
+        return True
+
+    def forget(self, key: Key) -> None:
+        """Removes the runs of the key."""
+        self._delete(self._finished(key))
+        self.runs.pop(key, None)
+
+    def adopt(self, key: Key, parent: str) -> None:
+        """Makes the run of the key a child of another."""
+        run = self.known(key)
+        if run and run.parent != parent:
+            with self._unless_gone(run.id):  # who made it anew has named its parent
+                self.client.set_tag(run.id, PARENT, parent)
+            self.runs[key] = [replace(run, parent=parent)]
+
+    def _write(self, told: Content, tags: dict[str, str]) -> None:
+        made: list[str] = []
+        with self._unless_gone(made) as gone:
+            _tracked_run.write(self.client, self.experiment, told, tags, made.append)
+        if gone:
+            raise _GoneError
+
+    @contextlib.contextmanager
+    def _unless_gone(self, run: str | list[str]) -> Iterator[list[str]]:
+        """Errors of the body are forgiven where another writer has removed the run; its id is then in what is yielded.
+
+        `run` is an id, or a list that will have it.
+        """
+        gone: list[str] = []
         try:
-            _tracked_run.write(self.client, self.experiment, told, tags, note)
+            yield gone
         except _tracking_errors.errors() as error:
+            ids = [run] if isinstance(run, str) else run
             away = _tracking_errors.kind(error) is not Kind.CELL
-            if away or not made or self.client.get_run(made).info.lifecycle_stage == "active":
+            if away or not ids or self.client.get_run(ids[0]).info.lifecycle_stage == "active":
                 raise
-            raise _GoneError from None
+            gone += ids
 
-    def _experiment(self) -> str:
-        """The id of the experiment, made where there is none; others may be making it too, or restoring it."""
+    def _find_experiment(self) -> None:
+        """Finds the experiment, or makes it; others may be making it too, or restoring it."""
         from mlflow.exceptions import MlflowException
 
         for last in (False, False, True):
             found = self.client.get_experiment_by_name(self.study)
             try:
                 if found is None:
-                    return self.client.create_experiment(self.study, artifact_location=self._artifacts())
+                    made = self.client.create_experiment(self.study, artifact_location=self._artifacts())
+                    found = self.client.get_experiment(made)
                 if found.lifecycle_stage == "deleted":
                     self.client.restore_experiment(found.experiment_id)
-                return found.experiment_id
+                self.experiment, self.tags = found.experiment_id, dict(found.tags)
+                self.created_ms = found.creation_time or 0
+                return
             except MlflowException:  # "already exists", also where only the answer to making it was lost
                 if last:
                     raise
-        raise AssertionError
 
     def _artifacts(self) -> str | None:
         return None if is_remote(self.uri) else (Path(self.tracking.artifacts).resolve() / self.study).as_uri()
 
-    def _runs(self, name: str | None = None) -> dict[str, list[Run]]:
-        """All runs by cell; unfinished ones too."""
-        known: dict[str, list[Run]] = {}
-        asked = f"tags.`{CELL}` = '{name}'" if name else f"tags.`{CELL}` != ''"
+    def _search(self, asked: str) -> dict[Key, list[Run]]:
+        """Runs by key, unfinished ones too; those that viewbench has not made are none."""
+        known: dict[Key, list[Run]] = {}
         token = None
         while True:
             page = self.client.search_runs([self.experiment], filter_string=asked, max_results=1000, page_token=token)
             for run in page:
-                tags, info = run.data.tags, run.info
-                finished = info.status == "FINISHED"
-                found = Run(info.run_id, finished, tags.get(FINGERPRINT, ""), tags.get(WRITER, ""), info.start_time)
-                known.setdefault(tags[CELL], []).append(found)
+                key = _key(run.data.tags)
+                if key:
+                    known.setdefault(key, []).append(_run(run))
             token = page.token
             if not token:
                 return known
 
-    def _finished(self, name: str) -> list[Run]:
-        """The finished runs of a cell; what this writer left of it unfinished is removed."""
-        runs = self._runs(name).get(name, [])
+    def _finished(self, key: Key) -> list[Run]:
+        """The finished runs of a key; what this writer left of it unfinished is removed."""
+        runs = self._search(f"tags.`{KINDS[key[0]]}` = '{key[1]}'").get(key, [])
         self._delete(run for run in runs if run.writer == self.writer and not run.finished)
         return [run for run in runs if run.finished]
 
@@ -149,15 +223,31 @@ class Log:
             self.client.delete_run(run.id)
 
 
-def _fingerprint(folder: Path, name: str) -> str:
-    try:
-        return _tracked_run.fingerprint(folder)
-    except OSError as error:
-        raise UserError(f"cell {name} cannot be read: {error.strerror}: {error.filename}") from None
+def _key(tags: Mapping[str, str]) -> Key | None:
+    """Kind and key of a run; runs of earlier versions are all of cells, and do not say so."""
+    for kind, tag in KINDS.items():
+        if tag in tags and tags.get(KIND, kind) == kind:
+            return kind, tags[tag]
+    return None
 
 
-def _content(cell: dict[str, str], folder: Path, renders: int) -> _tracked_run.Content:
+def _digest(numbers: Sequence[Number]) -> str:
+    """Tells a point from another one of the same ratio."""
+    return hashlib.sha256(repr(sorted(numbers)).encode()).hexdigest()[:12]
+
+
+def _run(found: Any) -> Run:
+    tags, info = found.data.tags, found.info
     try:
-        return _tracked_run.content(cell, folder, renders)
-    except (KeyError, TypeError, AttributeError) as error:
-        raise UserError(f"the files of cell {cell_name(cell)} are not as viewbench writes them ({error!r})") from None
+        points = json.loads(tags.get(POINTS, "{}"))
+    except ValueError:
+        points = {"": "unreadable"}  # which no point is: the run is made anew
+    return Run(
+        id=info.run_id,
+        finished=info.status == "FINISHED",
+        fingerprint=tags.get(FINGERPRINT, ""),
+        writer=tags.get(WRITER, ""),
+        started=info.start_time,
+        parent=tags.get(PARENT, ""),
+        points=points if isinstance(points, dict) else {"": "unreadable"},
+    )

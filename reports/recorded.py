@@ -43,24 +43,25 @@ def build(study: Study, out: Path) -> list[Item]:
 
 def recordings(folder: Path) -> list[Recording]:
     """Everything under `folder`, by name. Raises UserError for an about.json or results.csv that is broken."""
-    found = []
-    for path in sorted(folder.glob("*/about.json")):
-        about = read_json(path, "recording")
-        try:
-            found.append(
-                Recording(
-                    name=path.parent.name,
-                    title=about["title"],
-                    machine=dict(about["machine"]),
-                    versions=dict(about["versions"]),
-                    commands=tuple(about["commands"]),
-                    notes=about.get("notes", ""),
-                    cells=read_cells(path.parent / "results.csv", path.parent / "cells"),
-                )
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            raise UserError(f"recording '{path}' lacks or garbles {error}; see the README beside it") from None
-    return found
+    return [read(path.parent) for path in sorted(folder.glob("*/about.json"))]
+
+
+def read(folder: Path) -> Recording:
+    """The recording in a folder. Raises UserError for an about.json or results.csv that is broken."""
+    path = folder / "about.json"
+    about = read_json(path, "recording")
+    try:
+        return Recording(
+            name=folder.resolve().name,
+            title=about["title"],
+            machine=dict(about["machine"]),
+            versions=dict(about["versions"]),
+            commands=tuple(about["commands"]),
+            notes=about.get("notes", ""),
+            cells=read_cells(folder / "results.csv", folder / "cells"),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise UserError(f"recording '{path}' lacks or garbles {error}; see the README beside it") from None
 
 
 def _figure(study: Study, recording: Recording, out: Path) -> Item:

@@ -3,9 +3,10 @@
     python -m tests.soak --kills 60 --seed 0
 
 Kills are SIGKILL at random moments: of Snakemake, of a job (the `viewbench` that Snakemake started or the process that
-the fork server made for it), of the fork server, of the writer to MLflow, of MLflow's server, of the whole process
-group; and what a terminal does: Ctrl-C, and closing it. After each the user's command is given again, at once or when
-everything is quiet. Prints counts, and ends with status 1 where something is not as in an undisturbed run.
+the fork server made for it), of the fork server, of the writers to MLflow during the run (`follow`) and at its end, of
+MLflow's server, of the whole process group; and what a terminal does: Ctrl-C, and closing it. After each the user's
+command is given again, at once or when everything is quiet. Prints counts, and ends with status 1 where something is
+not as in an undisturbed run.
 """
 
 import argparse
@@ -57,7 +58,7 @@ SMALL = {
 OF_GROUP = {"group": signal.SIGKILL, "Ctrl-C": signal.SIGINT, "hang-up": signal.SIGHUP}
 KINDS = {  # and how often each is tried
     **{"snakemake": 3, "group": 2, "Ctrl-C": 1, "hang-up": 1, "select": 2, "train": 3, "evaluate": 3},
-    **{"forked job": 3, "fork server": 1, "track": 2, "mlflow server": 1},
+    **{"forked job": 3, "fork server": 1, "follow": 3, "track": 2, "mlflow server": 1},
 }
 QUIET_S = 60.0  # in which the jobs of a killed run must be gone
 FIND_S = 6.0  # in which a process of a kind may come
@@ -259,6 +260,8 @@ def is_of(kind: str, parent: int, line: str, run: subprocess.Popen) -> bool:
     """Whether a process is what `kind` names: the fork server's jobs have its command line."""
     if "_fork_server" in line:
         return kind == ("fork server" if parent == run.pid else "forked job")
+    if " --follow " in line:
+        return kind == "follow"
     return "viewbench" in line and f" {kind} " in line and not line.startswith(("/bin/bash", "bash", "/bin/sh"))
 
 

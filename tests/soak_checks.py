@@ -14,8 +14,9 @@ import numpy as np
 from PIL import Image
 
 from viewbench.common.files import SEAL, unsealed
+from viewbench.reports._tracking import CELL
 
-TIMES = {  # what differs from run to run: seconds, memory, and the hashes of records that have them
+TIMES = {  # what differs from run to run: seconds, times, memory, and the hashes of records that have them
     *(
         "seconds",
         "select_s",
@@ -25,6 +26,8 @@ TIMES = {  # what differs from run to run: seconds, memory, and the hashes of re
         "peak_rss_bytes",
         "peak_gpu_bytes",
         "train_sha256",
+        "began",
+        "ended",
         SEAL,
     ),
 }
@@ -146,7 +149,7 @@ def left_over(results: Path) -> list[Path]:
 
 
 def runs(uri: str, study: str) -> Counter:
-    """Runs in MLflow, those that were deleted aside, by cell and status."""
+    """Runs of cells in MLflow, those that were deleted aside, by cell and status."""
     from mlflow import MlflowClient
 
     client = MlflowClient(tracking_uri=uri)
@@ -155,7 +158,7 @@ def runs(uri: str, study: str) -> Counter:
     found, token = [], None
     while True:
         page = client.search_runs([experiment.experiment_id], page_token=token)
-        found += [(run.data.tags["viewbench.cell"], run.info.status) for run in page]
+        found += [(run.data.tags[CELL], run.info.status) for run in page if CELL in run.data.tags]
         token = page.token
         if not token:
             return Counter(found)

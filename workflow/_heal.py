@@ -41,8 +41,7 @@ def heal(study: Study, results: Path, verify: bool = False) -> list[Path]:
             broken.append(train)
         if metrics.is_file() and not _whole_renders(folder, verify):
             broken.append(metrics)
-    # Not those of single cells: the end of the study takes up what they missed.
-    broken += [path for path in (results / "tracked.json",) if _failed(path)]
+    broken += [path for path in (results / "tracked.json", results / "published.json") if _failed(path)]
     for path in broken:
         path.unlink(missing_ok=True)
     return broken
@@ -50,7 +49,7 @@ def heal(study: Study, results: Path, verify: bool = False) -> list[Path]:
 
 def say(removed: list[Path]) -> None:
     """Tells the user which damaged results are made again, in one line; stamps of logging are none."""
-    told = [path for path in removed if not path.name.startswith("tracked") and "tracked" not in path.parts]
+    told = [path for path in removed if path.name not in ("tracked.json", "published.json")]
     # Of a cell it is the record that goes, whichever of its files is damaged.
     names = sorted({str(path.parent if "cells" in path.parts else path) for path in told})
     if names:

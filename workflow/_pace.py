@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 # What a job of a rule is called while it runs; of those that are many, which it is.
-MANY = {"select": "choosing", "train": "training", "evaluate": "scoring", "track_cell": "logging", "report": "drawing"}
+MANY = {"select": "choosing", "train": "training", "evaluate": "scoring", "report": "drawing"}
 ONE = {
     "study": "checking the study",
     "describe": "describing {scene}",
@@ -17,9 +17,10 @@ ONE = {
     "collect": "gathering the results",
     "track": "logging to MLflow",
     "page": "putting the page together",
+    "publish": "putting the page into MLflow",
 }
 # Seconds that a job takes where none of its rule has ended yet; those of a cell are scaled by what cells took.
-TYPICAL = {"warm": 20.0, "features": 10.0, "track": 8.0, "report": 2.0, "page": 2.0}
+TYPICAL = {"warm": 20.0, "features": 10.0, "track": 4.0, "report": 2.0, "page": 2.0, "publish": 3.0}
 OF_A_CELL = {"select": 0.5, "train": 5.0, "evaluate": 1.5}
 OTHERWISE = 1.0
 

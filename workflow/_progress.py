@@ -92,7 +92,7 @@ class Progress(logging.Handler):
         elif event == "JOB_FINISHED":
             rule = self.pace.end(getattr(record, "job_id", -1))
             self.phase = "looking for what is next"
-            self._show(final=rule == "page")
+            self._show(final=rule == "publish")
         elif event == "JOB_ERROR":
             self._fail(record)
         elif event == "GROUP_ERROR":  # its jobs follow, each with its error
@@ -250,8 +250,9 @@ def salvage(study: Any, given: str) -> None:
     print("Reporting the cells that are finished; the same command takes up the rest.", file=sys.stderr)
     for arguments in (
         ["collect", given, "--partial"],
-        ["track", given, "--stamp", str(results / "tracked.partial.json")],
+        ["track", given, "--only", "cells", "--stamp", str(results / "tracked.partial.json")],
         ["report", str(results)],
+        ["track", given, "--only", "page", "--stamp", str(results / "published.partial.json")],
     ):
         subprocess.run([sys.executable, "-m", "viewbench", *arguments], check=False)
 

@@ -37,7 +37,7 @@ class Job:
         given, entry = self.wildcards, study.selector(cell["selector"])
         choice = repr(entry.choice_part(float(cell["ratio"]))), str(entry.choice_seed(int(cell["seed"])))
         needed = {
-            **dict.fromkeys(("describe", "render", "rendered", "train", "evaluate", "track_cell"), True),
+            **dict.fromkeys(("describe", "render", "rendered", "train", "evaluate"), True),
             "select": (given.get("part"), given.get("seed")) == choice,
             "features": study.gives_features(entry),
             "warm_selector": given.get("plugin") == entry.selector,

@@ -21,7 +21,6 @@ from ..common.errors import UserError
 from ..common.files import sha256_file
 from ..common.settings import PACKAGE, Settings
 from ..reports._tracking_errors import masked
-from ..reports._tracking_log import is_remote
 from ..scenes import seen
 from ..scenes.whereabouts import absence, python_of, renderable, renders
 from ..selectors import _run
@@ -355,13 +354,8 @@ class Wiring:
     def tracking(self) -> str:
         """Where runs are logged to, without the password that an address may hold; hashed, since it is long."""
         asked = self.settings.tracking
-        where = (masked(asked.uri, asked.uri), asked.artifacts, asked.renders)
+        where = (masked(asked.uri, asked.uri), asked.artifacts, asked.renders, asked.models)
         return hashlib.sha256(repr(where).encode()).hexdigest()[:16]
-
-    @property
-    def tracks_as_it_goes(self) -> bool:
-        """Whether cells are logged one by one as they finish."""
-        return is_remote(self.settings.tracking.uri)
 
 
 class _Cell:

@@ -35,6 +35,7 @@ def test_no_keys_is_enough(tmp_path):
         ("[features]\nbatch = '16'", "expected a whole number"),
         ("[features]\nbatch = 0", "expected a positive number"),
         ("[tracking]\nrenders = -1", "expected 0 or more"),
+        ("[tracking]\nmodels = 1.5", "expected a whole number"),
         ("[features]\nbatch = true", "expected a whole number"),
         ("[command.x]\ntrain = 'a b'", "expected a list"),
         ("[command.x]\ntrain = [1]", "list of strings"),

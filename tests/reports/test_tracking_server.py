@@ -1,6 +1,5 @@
 import contextlib
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -13,13 +12,13 @@ import pytest
 
 from tests.conftest import known
 from tests.reports.mlflow_server import Proxy, Server, once
-from tests.reports.test_tracking import ROWS, write_cell
+from tests.reports.test_tracking import GROUPS, ROWS, about, counts, write_cell
 from viewbench.common.cells import cell_name
 from viewbench.common.errors import UserError
 from viewbench.common.settings import Tracking
-from viewbench.reports import _tracking, _tracking_away
+from viewbench.reports import _tracking
 
-FILES = {"selection.json", "train.json", "metrics.json", "renders"}
+FILES = {"selection.json", "train.json", "metrics.json", "renders", "model"}
 
 
 @pytest.fixture(scope="module")
@@ -63,26 +62,51 @@ def runs_of(server, study):
     return client, client.search_runs([experiment.experiment_id], max_results=1000)
 
 
-def assert_right(server, study, rows=ROWS):
-    """One finished run a cell, none of them in part."""
+def log(name, rows, results, tracking, **more):
+    return counts(_tracking.track(about(name), rows, results, tracking, **more))
+
+
+def cells_of(server, study):
+    """Client, and the runs of cells alone."""
     client, runs = runs_of(server, study)
-    assert sorted(run.data.tags[_tracking.CELL] for run in runs) == sorted(map(cell_name, rows))
-    for run in runs:
-        assert run.info.status == "FINISHED"
+    return client, [run for run in runs if _tracking.CELL in run.data.tags]
+
+
+def assert_right(server, study, rows=ROWS):
+    """One finished run a cell and a summary, none of them in part; cells are children of summaries."""
+    client, runs = runs_of(server, study)
+    assert {run.info.status for run in runs} == {"FINISHED"}
+    cells = [run for run in runs if _tracking.CELL in run.data.tags]
+    summaries = {run.info.run_id: run for run in runs if run not in cells}
+    assert sorted(run.data.tags[_tracking.CELL] for run in cells) == sorted(map(cell_name, rows))
+    groups = {name.rsplit("/", 2)[0] for name in map(cell_name, rows)}
+    assert groups <= set(GROUPS)
+    assert sorted(run.data.tags["viewbench.summary"] for run in summaries.values()) == sorted(groups)
+    for run in cells:
         assert run.data.metrics["psnr_db"] == 20.0
         assert run.data.params["n_views"] == "40"
+        assert len(run.inputs.dataset_inputs) == 1
         assert {item.path for item in client.list_artifacts(run.info.run_id)} == FILES
         assert len(client.get_metric_history(run.info.run_id, "train/loss")) == 3
+        assert (
+            summaries[run.data.tags["mlflow.parentRunId"]].data.tags["viewbench.summary"]
+            in run.data.tags[_tracking.CELL]
+        )
+    for run in summaries.values():
+        assert [point.value for point in client.get_metric_history(run.info.run_id, "psnr_db")] == [20.0]
 
 
-REQUESTS = ("experiments/create", "runs/search", "runs/create", "runs/log-batch", "renders/0.png", "runs/update")
+REQUESTS = (
+    *("experiments/create", "experiments/set-experiment-tag", "runs/search", "runs/create", "runs/log-batch"),
+    *("runs/log-inputs", "renders/0.jpg", "model/model.ply", "runs/update"),
+)
 
 
 @pytest.mark.parametrize("request_", REQUESTS)
 def test_an_answer_that_is_lost_leaves_no_second_run(server, proxy, study, request_):
     name, results = study
     proxy.loses = once(request_)
-    assert _tracking.track_cell(name, ROWS[0], results, Tracking(uri=proxy.url)) == {"logged": 1, "kept": 0}
+    assert log(name, ROWS[:1], results, Tracking(uri=proxy.url)) == {"logged": 1, "kept": 0}
     assert sum(count for asked, count in proxy.requests.items() if asked.endswith(request_)) >= 2
     assert_right(server, name, ROWS[:1])
 
@@ -92,11 +116,11 @@ def test_an_answer_that_is_never_heard_is_cleared_by_the_next_call(server, proxy
     name, results = study
     proxy.loses = lambda method, path: path.endswith(request_)
     with pytest.raises(UserError, match="did not take the runs"):
-        _tracking.track_cell(name, ROWS[0], results, Tracking(uri=proxy.url))
+        log(name, ROWS[:1], results, Tracking(uri=proxy.url, patience=0))
     _, runs = runs_of(server, name)
     assert runs  # which nobody knows to be there
     proxy.calm()
-    _tracking.track(name, ROWS, results, Tracking(uri=proxy.url))
+    log(name, ROWS, results, Tracking(uri=proxy.url))
     assert_right(server, name)
 
 
@@ -104,11 +128,13 @@ WRITER = """
 import sys, json
 from pathlib import Path
 from viewbench.common.settings import Tracking
-from viewbench.reports import _tracking
+from viewbench.reports import _about, _tracking
 study, row, results, uri = sys.argv[1:]
+row = json.loads(row)
+told = _about.About(study, "A study to log", "", "viewbench run demo.yaml", ("random", "maxmin"), (row,))
 print("ready", flush=True)
 sys.stdin.readline()
-_tracking.track_cell(study, json.loads(row), Path(results), Tracking(uri=uri))
+_tracking.track(told, [row], Path(results), Tracking(uri=uri))
 """
 
 
@@ -136,25 +162,25 @@ def test_a_writer_that_is_killed_leaves_nothing(server, proxy, study, request_):
     assert process.returncode == -signal.SIGKILL
     proxy.calm()
     end = time.monotonic() + 30
-    while len(runs_of(server, name)[1]) < 1 and time.monotonic() < end:
+    while not runs_of(server, name)[1] and time.monotonic() < end:
         time.sleep(0.1)  # the server does what it was asked after all
-    assert len(runs_of(server, name)[1]) == 1
-    _tracking.track(name, ROWS, results, Tracking(uri=proxy.url))
+    assert runs_of(server, name)[1]
+    log(name, ROWS, results, Tracking(uri=proxy.url))
     assert_right(server, name)
 
 
-def test_eight_writers_at_once_two_a_cell_in_an_experiment_that_is_not_there(server, proxy, study):
+def test_eight_writers_of_all_cells_at_once_in_an_experiment_that_is_not_there(server, proxy, study):
     name, results = study
     barrier, failed = threading.Barrier(8), []
 
-    def write(row):
+    def write(number):
         barrier.wait()
         try:
-            _tracking.track_cell(name, row, results, Tracking(uri=proxy.url))
+            log(name, ROWS[number % 2 :] + ROWS[: number % 2], results, Tracking(uri=proxy.url))
         except UserError as error:
             failed.append(str(error))
 
-    threads = [threading.Thread(target=write, args=(row,)) for row in ROWS for _ in range(2)]
+    threads = [threading.Thread(target=write, args=(number,)) for number in range(8)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -168,14 +194,14 @@ def test_a_run_that_another_removes_is_begun_again(server, proxy, study):
     removed = []
 
     def removes(method, path):
-        if path.endswith("renders/0.png") and not removed:
-            client, runs = runs_of(server, name)
+        if path.endswith("renders/0.jpg") and not removed:
+            client, runs = cells_of(server, name)
             removed.append(runs[0].info.run_id)
             client.delete_run(removed[0])
         return False
 
     proxy.loses = removes
-    _tracking.track_cell(name, ROWS[0], results, Tracking(uri=proxy.url))
+    log(name, [ROWS[0]], results, Tracking(uri=proxy.url))
     assert len(removed) == 1
     assert_right(server, name, ROWS[:1])
 
@@ -190,18 +216,18 @@ def test_a_cell_that_is_made_anew_while_it_is_logged_is_logged_anew(server, prox
         return False
 
     proxy.loses = changes
-    _tracking.track_cell(name, ROWS[0], results, Tracking(uri=proxy.url))
+    log(name, [ROWS[0]], results, Tracking(uri=proxy.url))
     assert_right(server, name, ROWS[:1])
 
 
 def test_an_experiment_that_was_deleted_is_restored_without_what_was_removed(server, proxy, study):
     name, results = study
     tracking = Tracking(uri=proxy.url)
-    _tracking.track(name, ROWS, results, tracking)
+    log(name, ROWS, results, tracking)
     client, runs = runs_of(server, name)
     client.create_run(runs[0].info.experiment_id, tags=runs[0].data.tags)  # as a writer that was killed leaves it
     client.delete_experiment(runs[0].info.experiment_id)
-    assert _tracking.track(name, ROWS, results, tracking) == {"logged": 0, "kept": 4}
+    assert log(name, ROWS, results, tracking) == {"logged": 0, "kept": 4}
     assert_right(server, name)
 
 
@@ -209,64 +235,35 @@ def test_a_cell_takes_few_requests(server, proxy, study):
     name, results = study
     train = results / "cells" / cell_name(ROWS[0]) / "train.json"
     record = json.loads(train.read_text())
-    record["curve"] = [{"step": i, "seconds": 0.001 * i, "loss": 1.0, "test_psnr_db": 9.0} for i in range(1, 601)]
+    record["curve"] = [{"step": i, "seconds": 0.001 * i, "loss": 1.0, "test_psnr_db": 9.0} for i in range(1, 1201)]
     train.write_text(json.dumps(record))
     tracking = Tracking(uri=proxy.url, renders=3)
-    _tracking.track_cell(name, ROWS[0], results, tracking)
-    assert sum(count for asked, count in proxy.requests.items() if asked.endswith("log-batch")) == 3  # of 2409 numbers
+    log(name, ROWS[:1], results, tracking)
+    # of 2409 numbers, and of the point of a summary
+    assert sum(count for asked, count in proxy.requests.items() if asked.endswith("log-batch")) == 3 + 2
     proxy.calm()
-    _tracking.track_cell(name, ROWS[1], results, tracking)
-    assert sum(proxy.requests.values()) <= 6 + 6  # six files
+    rows = [{**row, "selector": "coverage"} for row in ROWS[:2]]
+    for row in rows:
+        write_cell(results, row)
+    _tracking.track(about(name, [*ROWS, *rows]), rows, results, tracking)
+    # seven files; two searches, to begin, numbers, data set, to end; and a summary without files, with a point
+    start, cell, summary = 2, 7 + 2 + 4, 2 + 4 + 2
+    assert sum(proxy.requests.values()) == start + 2 * cell + summary
+    log(name, ROWS, results, tracking)
     proxy.calm()
-    _tracking.track_cell(name, ROWS[1], results, tracking)
+    assert log(name, ROWS, results, tracking) == {"logged": 0, "kept": 4}
     assert sum(proxy.requests.values()) == 2
-    _tracking.track(name, ROWS, results, tracking)
-    proxy.calm()
-    assert _tracking.track(name, ROWS, results, tracking) == {"logged": 0, "kept": 4}
-    assert sum(proxy.requests.values()) == 2
-
-
-def test_a_server_that_is_away_is_not_asked_by_every_job(server, proxy, study):
-    name, results = study
-    tracking = Tracking(uri=proxy.url, patience=0)
-    proxy.refuses = lambda method, path: True
-    with pytest.raises(UserError, match="503"):
-        _tracking.track_cell(name, ROWS[0], results, tracking)
-    asked = sum(proxy.requests.values())
-    assert asked <= 2
-    for row in ROWS[1:]:
-        with pytest.raises(UserError, match=r"was away \d+ s ago, so it was not asked"):
-            _tracking.track_cell(name, row, results, tracking)
-    assert sum(proxy.requests.values()) == asked
-
-    # later one job asks, for all of them
-    (file,) = results.rglob("away.json")
-    long_ago = time.time() - 2 * _tracking_away.AGAIN_S
-    os.utime(file, (long_ago, long_ago))
-    for expected in ("503", "not asked"):
-        with pytest.raises(UserError, match=expected):
-            _tracking.track_cell(name, ROWS[0], results, tracking)
-    os.utime(file, (long_ago, long_ago))
-    proxy.calm()
-    for row in ROWS[:2]:
-        assert _tracking.track_cell(name, row, results, tracking) == {"logged": 1, "kept": 0}
-
-    # another address is another server
-    away = Tracking(uri="http://127.0.0.1:9", patience=0)
-    with pytest.raises(UserError, match="refused"):
-        _tracking.track_cell(name, ROWS[2], results, away)
-    assert _tracking.track_cell(name, ROWS[2], results, tracking) == {"logged": 1, "kept": 0}
 
 
 def test_the_end_of_a_study_waits_for_a_server(server, proxy, study):
     name, results = study
     proxy.refuses = lambda method, path: True
     with pytest.raises(UserError, match="503"):
-        _tracking.track(name, ROWS, results, Tracking(uri=proxy.url, patience=1))
+        log(name, ROWS, results, Tracking(uri=proxy.url, patience=1))
     said = []
     timer = threading.Timer(3, proxy.calm)
     timer.start()
-    done = _tracking.track(name, ROWS, results, Tracking(uri=proxy.url, patience=300), say=said.append)
+    done = log(name, ROWS, results, Tracking(uri=proxy.url, patience=300), say=said.append)
     assert done == {"logged": 4, "kept": 0}
     assert len(said) == 1
     assert "asking again" in said[0]
@@ -279,15 +276,15 @@ def test_a_cell_that_is_not_taken_leaves_the_others(server, proxy, study):
     whole = broken.read_text()
     broken.write_text("{")
     with pytest.raises(UserError, match=rf"took 3 of 4 cells, first without {cell_name(ROWS[1])}: .*not valid JSON"):
-        _tracking.track(name, ROWS, results, Tracking(uri=proxy.url))
+        log(name, ROWS, results, Tracking(uri=proxy.url))
     assert_right(server, name, [ROWS[0], *ROWS[2:]])
     broken.write_text(whole)
     # one that the server fails at each time, though it answers otherwise
     proxy.refuses = lambda method, path: path.endswith("log-batch")
     with pytest.raises(UserError, match=r"took 3 of 4 cells, first without"):
-        _tracking.track(name, ROWS, results, Tracking(uri=proxy.url))
+        log(name, ROWS, results, Tracking(uri=proxy.url))
     proxy.calm()
-    _tracking.track(name, ROWS, results, Tracking(uri=proxy.url))
+    log(name, ROWS, results, Tracking(uri=proxy.url))
     assert_right(server, name)
 
 
@@ -299,17 +296,17 @@ def test_no_password_is_told(server, proxy, study, user, header, monkeypatch, ca
     name, results = study
     monkeypatch.setenv("MLFLOW_TRACKING_TOKEN", "tok/en-4711")
     tracking = Tracking(uri=proxy.url.replace("//", f"//{user}"), patience=1)
-    _tracking.track(name, ROWS[:1], results, tracking)
+    log(name, ROWS[:1], results, tracking)
     assert {sent["Authorization"] for sent in proxy.headers} == {header}
     said = []
     proxy.refuses = lambda method, path: True
     with pytest.raises(UserError) as first:
-        _tracking.track_cell(name, ROWS[1], results, tracking)
+        log(name, [ROWS[1]], results, tracking)
     with pytest.raises(UserError) as second:
-        _tracking.track(name, ROWS, results, tracking, say=said.append)
+        log(name, ROWS, results, tracking, say=said.append)
     nobody = Tracking(uri=f"http://{user}127.0.0.1:9", patience=0)
     with pytest.raises(UserError) as third:
-        _tracking.track(name, ROWS, results, nobody)
+        log(name, ROWS, results, nobody)
     said += [str(error.value) for error in (first, second, third)]
     files = [path.read_text(errors="replace") for path in results.rglob("*") if path.is_file()]
     runs = [repr(run.to_dictionary()) for run in runs_of(server, name)[1]]
@@ -337,10 +334,10 @@ def test_who_must_be_named_and_who_is_no_server_is_said(server, study):
         threading.Thread(target=other.serve_forever, daemon=True).start()
         tracking = Tracking(uri=f"http://127.0.0.1:{other.server_address[1]}", patience=300)
         with pytest.raises(UserError, match="MLFLOW_TRACKING_USERNAME"):
-            _tracking.track(name, ROWS, results, tracking)
+            log(name, ROWS, results, tracking)
         for Handler.status, Handler.content in ((404, b"no such page"), (200, b"<html>")):
             with pytest.raises(UserError, match="no MLflow server"):
-                _tracking.track(name, ROWS, results, tracking)
+                log(name, ROWS, results, tracking)
         other.shutdown()
 
 
@@ -349,9 +346,9 @@ def test_a_certificate_is_trusted_where_a_variable_names_it(server, study, tmp_p
     certificate = self_signed(tmp_path)
     with contextlib.closing(Proxy(server.url, certificate)) as proxy:
         with pytest.raises(UserError, match="MLFLOW_TRACKING_SERVER_CERT_PATH"):
-            _tracking.track(name, ROWS, results, Tracking(uri=proxy.url, patience=300))
+            log(name, ROWS, results, Tracking(uri=proxy.url, patience=300))
         monkeypatch.setenv("MLFLOW_TRACKING_SERVER_CERT_PATH", str(certificate[0]))
-        _tracking.track(name, ROWS, results, Tracking(uri=proxy.url))
+        log(name, ROWS, results, Tracking(uri=proxy.url))
     assert_right(server, name)
 
 

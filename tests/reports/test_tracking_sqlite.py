@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.reports.test_tracking import ROWS, runs_of, write_cell
+from tests.reports.test_tracking import ROWS, runs_of, track, write_cell
 from viewbench.common.errors import UserError
 from viewbench.common.settings import Tracking
-from viewbench.reports import _tracking, _tracking_sqlite
+from viewbench.reports import _tracking_sqlite
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def logged(tmp_path_factory):
     folder = tmp_path_factory.mktemp("logged")
     for row in ROWS:
         write_cell(folder / "results" / "demo", row)
-    _tracking.track("demo", ROWS[:3], folder / "results" / "demo", tracking_in(folder))
+    track(folder / "results" / "demo", tracking_in(folder), ROWS[:3])
     return folder
 
 
@@ -41,7 +41,7 @@ def refused(store, match):
     """The sentence with which logging ends."""
     results, _, tracking = store
     with pytest.raises(UserError, match=match) as error:
-        _tracking.track("demo", ROWS, results, tracking)
+        track(results, tracking)
     assert len(str(error.value)) < 500
     return str(error.value)
 
@@ -54,7 +54,7 @@ def test_a_database_that_another_writes_to_is_waited_for(store):
         timer = threading.Timer(2, other.rollback)
         timer.start()
         patient = tracking_in(path.parent, patience=120)
-        assert _tracking.track("demo", ROWS, results, patient) == {"logged": 1, "kept": 3}
+        assert track(results, patient) == {"logged": 1, "kept": 3}
         timer.join()
     assert len(runs_of(tracking)[1]) == 4
 
@@ -78,7 +78,7 @@ def test_a_damaged_database_is_named_and_a_new_one_takes_everything(store):
         path.write_bytes(content)
         assert "move " in refused(store, "damaged|malformed")
     path.unlink()
-    assert _tracking.track("demo", ROWS, results, tracking) == {"logged": 4, "kept": 0}
+    assert track(results, tracking) == {"logged": 4, "kept": 0}
 
 
 def test_a_file_that_cannot_be_written_to_is_named(store):
@@ -100,19 +100,20 @@ def test_a_file_that_cannot_be_written_to_is_named(store):
 def test_a_folder_and_an_address_that_is_none_are_named(store):
     results, path, _ = store
     with pytest.raises(UserError, match="is a folder"):
-        _tracking.track("demo", ROWS, results, Tracking(uri=f"sqlite:///{path.parent}"))
+        track(results, Tracking(uri=f"sqlite:///{path.parent}"))
     with pytest.raises(UserError, match=r"127\.0\.0\.1:5000"):
-        _tracking.track("demo", ROWS, results, Tracking(uri="127.0.0.1:5000://", patience=0))
+        track(results, Tracking(uri="127.0.0.1:5000://", patience=0))
 
 
 def test_two_that_make_a_database_at_once(tmp_path):
     """As two studies do that end together in a new folder: MLflow's own making of a database fails then."""
     code = (
         "import sys; from pathlib import Path; from viewbench.common.settings import Tracking\n"
-        "from viewbench.reports import _tracking\n"
+        "from viewbench.reports import _about, _tracking\n"
         "folder = Path(sys.argv[1])\n"
         "tracking = Tracking(f'sqlite:///{folder}/mlflow.db', str(folder / 'a'), patience=100)\n"
-        "_tracking.track(sys.argv[2], [], folder / sys.argv[2], tracking)"
+        "told = _about.About(sys.argv[2], '', '', '', (), ())\n"
+        "_tracking.track(told, [], folder / sys.argv[2], tracking)"
     )
     jobs = [
         subprocess.Popen([sys.executable, "-c", code, str(tmp_path), name], stderr=subprocess.PIPE, text=True)

@@ -6,7 +6,19 @@ from pathlib import Path
 from typing import Any
 
 # Keys that say how a run went and not what came out of it.
-OF_THE_RUN = ("_s", "seconds", "time", "rss", "commit", "machine", "threads", "content_sha256", "train_sha256")
+OF_THE_RUN = (
+    "_s",
+    "seconds",
+    "time",
+    "rss",
+    "commit",
+    "machine",
+    "threads",
+    "content_sha256",
+    "train_sha256",
+    "began",
+    "ended",
+)
 
 
 def _lasting(value: Any) -> Any:

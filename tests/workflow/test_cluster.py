@@ -25,7 +25,7 @@ from viewbench.workflow._resources import Needs, Size
 from viewbench.workflow._study import BackendEntry
 
 PROFILE = PACKAGE / "workflow" / "profiles" / "slurm"
-LOCAL = {"study", "collect", "track_cell", "track", "report", "page", "reports"}
+LOCAL = {"study", "collect", "track", "report", "page", "publish", "reports"}
 REST = """
 backends: [splat]
 width: 32

@@ -66,7 +66,8 @@ output = "cloud.ply"
 version = ["cat", {version!r}]
 """
 NEAREST = Path(__file__).parents[1] / "backends" / "nearest_view.py"
-TABLES = {"collect": 1, "track": 1, "report": 2, "page": 1, "reports": 1}
+LOGGED = {"track": 1, "page": 1, "publish": 1, "reports": 1}
+TABLES = {"collect": 1, "track": 1, "report": 2, "page": 1, "publish": 1, "reports": 1}
 EVERYTHING = {"describe": 1, "features": 1, "select": 2, "train": 6, "evaluate": 6, **TABLES}
 
 
@@ -154,7 +155,7 @@ MUTATIONS = {
     "the command that trains": (environment('"{iterations}"]\nrender', '"3"]\nrender'), OURS),
     "the command that renders": (environment('"{renders}"]', '"{renders}", "--seed", "1"]'), {"evaluate": 2, **TABLES}),
     "weights of LPIPS": (weights, {"evaluate": 6, **TABLES}),
-    "renders that are logged": (environment("renders = 1", "renders = 2"), {"track": 1, "page": 1, "reports": 1}),
+    "renders that are logged": (environment("renders = 1", "renders = 2"), LOGGED),
     # what the machine has
     "a program's version": (
         lambda clone: (clone.folder.parent / "version.txt").write_text("2.0\n"),
@@ -198,8 +199,8 @@ MUTATIONS = {
     "what runs programs": (source("backends/_process.py"), {"warm": 2, "train": 4, "evaluate": 4, **TABLES}),
     "the scoring": (source("backends/_metrics.py"), {"evaluate": 6, **TABLES}),
     "the description of scenes": (source("workflow/commands/describe.py"), {"describe": 1, **TABLES}),
-    "a report": (source("reports/cameras.py"), {"report": 1, "page": 1, "reports": 1}),
-    "the log": (source("reports/_tracking.py"), {"track": 1, "page": 1, "reports": 1}),
+    "a report": (source("reports/cameras.py"), {"report": 1, "page": 1, "publish": 1, "reports": 1}),
+    "the log": (source("reports/_tracking.py"), LOGGED),
     # results
     "a score that is gone": (
         lambda clone: next(clone.results.rglob("metrics.json")).unlink(),

@@ -1,7 +1,9 @@
-"""Log a study's cells to MLflow."""
+"""Log a study to MLflow."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -9,46 +11,113 @@ from . import _options
 
 
 @click.command()
-@click.argument("study")
+@click.argument("study", required=False)
 @click.option("--results", type=click.Path(path_type=Path), default="results", show_default=True)
-@click.option("--cell", metavar="B/SCENE/SEL/RATIO/SEED", help="Log this cell only; a store that is down is no error.")
+@click.option("--only", type=click.Choice(["cells", "page"]), help="The cells and their summaries, or the page.")
+@click.option("--follow", is_flag=True, help="Log cells as they are scored, until this is stopped (Ctrl-C).")
+@click.option("--import", "recording", metavar="FOLDER", type=click.Path(path_type=Path), help="Log a recording.")
 @click.option("--stamp", type=click.Path(path_type=Path), help="File to write when done, for the workflow.")
-def command(study: str, results: Path, cell: str | None, stamp: Path | None) -> None:
-    """Log the finished cells of STUDY: new ones and changed ones; a cell never has two runs."""
+@click.option("--of-run", is_flag=True, hidden=True, help="With --follow: cells that are stale come in by stdin.")
+def command(
+    study: str | None,
+    results: Path,
+    only: str | None,
+    follow: bool,
+    recording: Path | None,
+    stamp: Path | None,
+    of_run: bool,
+) -> None:
+    """Log the finished cells of STUDY, and its page: what is new or has changed; a cell never has two runs.
+
+    With --import it is a folder that is logged: one of recorded results (about.json and results.csv), or results/STUDY
+    of another machine.
+    """
     from ...common import settings as settings_file
-    from ...common.cells import cell_name
     from ...common.errors import UserError
     from ...common.files import write_json
-    from ...reports import _tracking
+    from ...reports import _about, _tracked_link, _tracking
     from .. import _collect, _study
 
     settings = settings_file.load()
+    asked = settings.tracking
+    if recording is not None:
+        _import(recording, study, settings)
+        return
+    if study is None:
+        raise UserError("name a study, or a folder with --import")
     checked = _study.load(study, settings)
-    cells = checked.cells()
-    if cell is not None:
-        cells = [row for row in cells if cell_name(row) == cell]
-        if not cells:
-            raise UserError(f"study '{study}' has no cell '{cell}'")
-    else:
-        cells = _collect.without_stale(cells, results / checked.name)
-    done: dict = {"skipped": _tracking.NO_TRACKING}
-    asked, folder = settings.tracking, results / checked.name
+    folder, cells = results / checked.name, checked.cells()
+    about = _about.of_study(checked.record(), cells, checked.source.name, settings.place_of)
+    if follow:
+        _follow(about, cells, folder, asked, of_run)
+        return
+    done: dict[str, Any] = {"skipped": _tracking.NO_TRACKING}
     try:
-        if asked.uri and cell is not None:
-            done = dict(_tracking.track_cell(checked.name, cells[0], folder, asked))
-        elif asked.uri:
-            done = dict(_tracking.track(checked.name, cells, folder, asked, _options.progress("track"), _say))
+        if asked.uri:
+            done = {}
+            if only != "page":
+                cells = _collect.without_stale(cells, folder)
+                done |= _alone(folder, asked, lambda: _tracking.track(about, cells, folder, asked, _progress(), _say))
+                done["figure"] = _tracked_link.address(asked.uri, str(done["experiment"]))
+            if only == "page" or (only is None and (folder / "reports" / "index.html").is_file()):
+                done |= _alone(folder, asked, lambda: _publish(about, folder, asked))
     except UserError as error:
         if stamp is None:
             raise
         # The study's results do not depend on the log: say what happened and go on.
         done = {"skipped": str(error)}
-        later = "the end of the study tries again" if cell else f"repeat with: viewbench track {study}"
-        _say(f"{error}; {later}")
+        _say(f"{error}; repeat with: viewbench track {study}")
     if stamp is not None:
         write_json(stamp, done)
     else:
-        click.echo(", ".join(f"{value} {key}" if key != "skipped" else str(value) for key, value in done.items()))
+        _tell(done)
+
+
+def _alone(folder: Path, tracking: Any, what: Callable[[], dict]) -> dict[str, Any]:
+    """What `what` returns, called while nobody else on this machine logs the study."""
+    from ...common import holding
+
+    with holding.alone(folder / "logs" / "track", tracking.patience):
+        return what()
+
+
+def _publish(about: Any, folder: Path, tracking: Any) -> dict[str, str]:
+    from ...reports import _tracking_page
+
+    return _tracking_page.publish(about, folder, tracking)
+
+
+def _import(recording: Path, name: str | None, settings: Any) -> None:
+    from ...reports import _tracking_import
+
+    _tell(_tracking_import.bring(recording, name, settings.tracking, _progress(), _say))
+
+
+def _follow(about: Any, cells: list[dict[str, str]], folder: Path, tracking: Any, of_run: bool) -> None:
+    """Until the run that started this process has ended, or the user stops it."""
+    import time
+
+    from ...common.errors import UserError
+    from ...reports import _tracking_follow
+    from .. import _tracker
+
+    if not tracking.uri:
+        raise UserError("tracking.uri is empty: there is nothing to log to")
+    stale, stopped = _tracker.led() if of_run else ((), lambda wait_s: bool(time.sleep(wait_s)))
+    follower = _tracking_follow.Follower(about, cells, folder, tracking, stale, _say)
+    _tracker.give_way()
+    follower.go_on(stopped)
+
+
+def _tell(done: dict[str, Any]) -> None:
+    words = [f"{value} {key}" for key, value in done.items() if key in ("logged", "kept")]
+    words += [str(done["skipped"])] if "skipped" in done else []
+    words += ["the page"] if "run" in done else []
+    click.echo(", ".join(words))
+
+
+def _progress() -> Callable[[int, int | None, str], None]:
+    return _options.progress("track")
 
 
 def _say(text: str) -> None:

@@ -23,38 +23,10 @@ rule collect:
         "viewbench collect {params.study:q} --results {params.results:q} > /dev/null 2> {log:q}"
 
 
-rule track_cell:
-    input:
-        f"{CELL}/metrics.json",
-        WIRING.command("track"),
-    output:
-        f"{RESULTS}/tracked/{AXES}.json",
-    log:
-        f"{RESULTS}/logs/track/{AXES}.log",
-    priority: 60
-    localrule: True
-    params:
-        study=GIVEN,
-        results=Path(RESULTS).parent,
-        cell=AXES,
-        tracking=WIRING.tracking,
-    message:
-        "log {wildcards.scene}/{wildcards.selector}/{wildcards.ratio}/{wildcards.seed} to MLflow"
-    shell:
-        "viewbench track {params.study:q} --results {params.results:q} --cell {params.cell:q}"
-        " --stamp {output:q} > /dev/null 2> {log:q}"
-
-
-# A server gets every cell as it is finished; a database beside the results gets them all at once at the end, since
-# opening it costs seconds and several jobs must not open a fresh one together.
+# What the process that follows the run (_tracker.py) has not logged, and the summaries. The page says whether that worked.
 rule track:
     input:
         results=f"{RESULTS}/results.csv",
-        cells=(
-            expand(f"{RESULTS}/tracked/{{cell}}.json", cell=CELLS)
-            if WIRING.tracks_as_it_goes
-            else []
-        ),
         depends=WIRING.command("track"),
     output:
         f"{RESULTS}/tracked.json",
@@ -69,7 +41,8 @@ rule track:
     message:
         "log the cells to MLflow"
     shell:
-        "viewbench track {params.study:q} --results {params.results:q} --stamp {output:q} > /dev/null 2> {log:q}"
+        "viewbench track {params.study:q} --results {params.results:q} --only cells --stamp {output:q}"
+        " > /dev/null 2> {log:q}"
 
 
 rule report:
@@ -106,3 +79,24 @@ rule page:
         "put the page together"
     shell:
         "viewbench report {params.folder:q} --page > /dev/null 2> {log:q}"
+
+
+rule publish:
+    input:
+        page=f"{RESULTS}/reports/index.html",
+        tracked=f"{RESULTS}/tracked.json",
+        depends=WIRING.command("track"),
+    output:
+        f"{RESULTS}/published.json",
+    log:
+        f"{RESULTS}/logs/publish.log",
+    localrule: True
+    params:
+        study=GIVEN,
+        results=Path(RESULTS).parent,
+        tracking=WIRING.tracking,
+    message:
+        "put the page into MLflow"
+    shell:
+        "viewbench track {params.study:q} --results {params.results:q} --only page --stamp {output:q}"
+        " > /dev/null 2> {log:q}"

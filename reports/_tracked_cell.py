@@ -1,0 +1,303 @@
+"""What MLflow is told of the cells of a study: times, tags, parameters, metrics with the curve of the training, files.
+
+Cells come from a study's folder (`StudyCells`), or from a table that was recorded (`_tracking_import.py`).
+"""
+
+import contextlib
+import getpass
+import hashlib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Protocol
+
+from ..common.cells import RECORDS, cell_folder, cell_name, figures, read_records
+from ..common.errors import UserError
+from ..common.files import read_json, sha256_file
+from ..common.settings import Tracking
+from ..selectors._selection import selection_sha256
+from ._about import About
+from ._tracked_run import COLOUR, COMMIT, DIRTY, LONGEST_DIGEST, SOURCE, SOURCE_TYPE, USER, Content, DataSet, params
+
+MB = 10**6
+VERSION = 2  # of how a cell is logged: another one replaces the runs that are there
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known of a cell."""
+
+    cell: Mapping[str, str]
+    figures: Mapping[str, float]  # scores, seconds and sizes, by name
+    count: int  # views chosen
+    n_views: int | None  # of the scene
+    named: Mapping[str, Any]  # budget and options, the same for all cells of a summary
+    tags: Mapping[str, str]  # of the trainer and its machine
+    commit: str
+    scene_sha256: str
+    began_ms: int  # since 1970
+    trained_ms: int  # when the training began
+    ended_ms: int
+
+
+class Cells(Protocol):
+    """Where cells come from."""
+
+    def facts(self, cell: Mapping[str, str]) -> Facts:
+        """Raises UserError for a cell that cannot be read."""
+        ...
+
+    def fingerprint(self, cell: Mapping[str, str]) -> str:
+        """What its run carries; raises UserError for a cell that cannot be read."""
+        ...
+
+    def content(self, cell: Mapping[str, str], parent: dict[str, str], drawn: Path) -> Content:
+        """Its run; `parent` is the tag that names its summary, pictures are drawn into `drawn`. Raises UserError."""
+        ...
+
+    def scene(self, name: str) -> dict[str, Any]:
+        """The description of a scene; empty where there is none."""
+        ...
+
+
+class StudyCells:
+    """The cells of results/STUDY."""
+
+    def __init__(self, about: About, results: Path, tracking: Tracking):
+        self.about, self.results, self.tracking = about, results, tracking
+        self._scenes: dict[str, tuple[Any, dict[str, Any]]] = {}
+
+    def facts(self, cell: Mapping[str, str]) -> Facts:
+        """From the cell's records."""
+        folder = cell_folder(self.results, cell)
+        with _explained(cell):
+            return _facts(cell, folder, *read_records(folder))
+
+    def fingerprint(self, cell: Mapping[str, str]) -> str:
+        """The hash of its records, of what the run is called, and of which files it gets."""
+        digest, folder = hashlib.sha256(), cell_folder(self.results, cell)
+        try:
+            for file in RECORDS:
+                digest.update((folder / file).read_bytes() + b"\0")
+        except OSError as error:
+            raise UserError(f"cell {cell_name(cell)} cannot be read: {error.strerror}: {error.filename}") from None
+        return fingerprint(digest.hexdigest(), cell, self.about, self.tracking.renders, self.tracking.models)
+
+    def content(self, cell: Mapping[str, str], parent: dict[str, str], drawn: Path) -> Content:
+        """With its records, pictures and model as files."""
+        folder = cell_folder(self.results, cell)
+        with _explained(cell):
+            selection, train, metrics = read_records(folder)
+            facts = _facts(cell, folder, selection, train, metrics)
+            return content(
+                facts,
+                self.about,
+                self.scene(cell["scene"]),
+                parent,
+                curve=_curve(train["curve"], facts.trained_ms),
+                files=[(folder / file, None) for file in RECORDS] + self._pictures(cell, selection, metrics, drawn),
+                linked=_model(folder, train, self.tracking.models),
+            )
+
+    def scene(self, name: str) -> dict[str, Any]:
+        """As `viewbench describe` wrote it; read again when that has written another one."""
+        path = self.results / "scenes" / f"{name}.json"
+        with contextlib.suppress(UserError, RecursionError, OSError):
+            found = path.stat()
+            stamp = (found.st_mtime_ns, found.st_size)
+            if self._scenes.get(name, (None, {}))[0] != stamp:
+                record = read_json(path, "scene description")
+                self._scenes[name] = (stamp, record if isinstance(record, dict) else {})
+            return self._scenes[name][1]
+        return {}
+
+    def coherent(self, cell: Mapping[str, str]) -> bool:
+        """Whether the score is of the model, and the model of the choice, that lie beside it: none is made anew."""
+        folder = cell_folder(self.results, cell)
+        with contextlib.suppress(KeyError, TypeError, AttributeError, UserError, OSError):
+            selection, train, metrics = read_records(folder)
+            chosen = train["selection_sha256"] == selection_sha256(selection)
+            return chosen and metrics["train_sha256"] == sha256_file(folder / "train.json")
+        return False
+
+    def _pictures(
+        self, cell: Mapping[str, str], selection: dict[str, Any], metrics: dict[str, Any], drawn: Path
+    ) -> list[tuple[Path, str | None]]:
+        """Strips of truth and render, and where the chosen cameras are; what cannot be drawn is left out."""
+        from . import _run_cameras, _run_pictures  # PIL
+
+        if not self.tracking.renders:
+            return []
+        folder, files = cell_folder(self.results, cell), list[tuple[Path, str | None]]()
+        for view in _run_pictures.views_to_show(metrics, self.tracking.renders):
+            with contextlib.suppress(UserError):
+                render, truth = _run_pictures.files_of(view, folder, self.results / "scenes" / cell["scene"])
+                strip = _run_pictures.strip(render, truth, _run_pictures.words_of(view))
+                path = drawn / f"{render.stem}{_run_pictures.JPEG}"
+                path.write_bytes(_run_pictures.encoded(strip))
+                files.append((path, "renders"))
+        with contextlib.suppress(UserError):
+            colour = self.about.colours[cell["selector"]]
+            figure = _run_cameras.cameras(self.scene(cell["scene"]), selection, colour)
+            path = drawn / f"cameras{_run_pictures.PNG}"
+            path.write_bytes(_run_pictures.encoded(figure, _run_pictures.PNG))
+            files.append((path, None))
+        return files
+
+
+def content(
+    facts: Facts,
+    about: About,
+    scene: dict[str, Any],
+    parent: dict[str, str],
+    curve: list[tuple[str, float, int, int]] = [],  # noqa: B006 - never changed
+    files: list[tuple[Path, str | None]] = [],  # noqa: B006
+    linked: list[tuple[Path, str | None]] = [],  # noqa: B006
+) -> Content:
+    """The run of a cell."""
+    cell = facts.cell
+    final = {**facts.figures, "ratio_percent": 100 * float(cell["ratio"])}
+    return Content(
+        kind="cell",
+        key=cell_name(cell),
+        name=about.cell_title(cell),
+        tags={"backend": cell["backend"], **facts.tags, **common_tags(about, cell["selector"], facts.commit)},
+        params=params({**cell, "count": facts.count, "n_views": facts.n_views, **facts.named}),
+        metrics=[(key, value, facts.ended_ms, 0) for key, value in final.items()] + curve,
+        started_ms=facts.began_ms,
+        ended_ms=facts.ended_ms,
+        files=files,
+        linked=linked,
+        data=data_set(about, cell["scene"], facts.scene_sha256, scene),
+        also=parent,
+    )
+
+
+def fingerprint(of_records: str, cell: Mapping[str, str], about: About, *look: object) -> str:
+    """What the run of a cell carries."""
+    told = (of_records, about.cell_title(cell), about.colours.get(cell["selector"]), *look, VERSION)
+    return hashlib.sha256(repr(told).encode()).hexdigest()
+
+
+def common_tags(about: About, selector: str, commit: str) -> dict[str, str]:
+    """Tags of MLflow's own that a cell and a summary have: who, from what, in which colour."""
+    tags = {
+        COLOUR: about.colours.get(selector, ""),
+        USER: user(),
+        SOURCE: about.source,
+        SOURCE_TYPE: "LOCAL",
+        COMMIT: commit.removesuffix("-dirty"),
+        DIRTY: str(commit.endswith("-dirty")) if commit else "",
+    }
+    return {key: value for key, value in tags.items() if value}
+
+
+def user() -> str:
+    """Who runs this, by name; empty where nobody knows."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError, ImportError):
+        return ""
+
+
+def data_set(about: About, scene: str, sha256: str, record: dict[str, Any]) -> DataSet:
+    """The scene as a data set, from its hash and its description."""
+    numbers = {"training views": "n_train", "test views": "n_test", "width": "width", "height": "height"}
+    profile = {words: record[key] for words, key in numbers.items() if key in record}
+    return DataSet(scene, sha256[:LONGEST_DIGEST], about.places.get(scene, scene), profile)
+
+
+def is_number(value: Any) -> bool:
+    """Whether MLflow takes the value as a metric."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _facts(
+    cell: Mapping[str, str],
+    folder: Path,
+    selection: dict[str, Any],
+    train: dict[str, Any],
+    metrics: dict[str, Any],
+) -> Facts:
+    """From the records of a cell.
+
+    The choosing, which several cells may share, counts as done right before the training. Records of earlier versions
+    name no times: those of their files stand for them.
+    """
+    known = {**figures(selection, train, metrics), "n_primitives": train["n_primitives"]}
+    named = {"width": train.get("width")}
+    named |= {f"budget.{key}": value for key, value in train["budget"].items()}
+    named |= {f"option.{key}": value for key, value in train.get("options", {}).items()}
+    named |= {f"selector.{key}": value for key, value in selection["parameters"].items()}
+    trained = _time(train.get("began")) or (folder / "train.json").stat().st_mtime - float(train["seconds"])
+    ended = _time(metrics.get("ended")) or (folder / "metrics.json").stat().st_mtime
+    began = trained - float(sum(selection["seconds"].values()))
+    began_ms, trained_ms, ended_ms = (round(1000 * at) for at in (began, trained, ended))
+    return Facts(
+        cell=cell,
+        figures={key: value for key, value in known.items() if is_number(value)},
+        count=int(selection["count"]),
+        n_views=selection["n_views"],
+        named=named,
+        tags={
+            "backend_version": str(train["version"]),
+            "device": str(train["device"]),
+            "machine": _machine(train.get("machine")),
+            "viewbench": str(train.get("viewbench", "")),
+        },
+        commit=str(train["commit"] or ""),
+        scene_sha256=str(train.get("scene_sha256", "")),
+        began_ms=min(began_ms, ended_ms),
+        trained_ms=trained_ms,
+        ended_ms=ended_ms,
+    )
+
+
+def _machine(record: Any) -> str:
+    """ "AMD EPYC, 2 CPUs, Linux x86_64, Python 3.11.7"."""
+    if not isinstance(record, dict):
+        return ""
+    parts = [record.get("cpu"), f"{record['cpus']} CPUs" if "cpus" in record else None, record.get("system")]
+    parts.append(f"Python {record['python']}" if "python" in record else None)
+    return ", ".join(str(part) for part in parts if part)
+
+
+@contextlib.contextmanager
+def _explained(cell: Mapping[str, str]) -> Iterator[None]:
+    """Records that are not as viewbench writes them become UserError."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"cell {cell_name(cell)} cannot be read: {error.strerror}: {error.filename}") from None
+    except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
+        raise UserError(f"the files of cell {cell_name(cell)} are not as viewbench writes them ({error!r})") from None
+
+
+def _time(text: Any) -> float | None:
+    """Seconds since 1970 of a time in ISO 8601 with its zone."""
+    with contextlib.suppress(TypeError, ValueError, OverflowError):
+        found = datetime.fromisoformat(text)
+        return found.timestamp() if found.tzinfo else None
+    return None
+
+
+def _curve(points: list[dict[str, Any]], began_ms: int) -> list[tuple[str, float, int, int]]:
+    """By step, and by when the trainer was there."""
+    curve = []
+    for point in points:
+        stamp = began_ms + round(1000 * (point["seconds"] or 0))
+        for key, metric in (("loss", "train/loss"), ("test_psnr_db", "train/test_psnr_db")):
+            if is_number(point.get(key)):
+                curve.append((metric, point[key], stamp, int(point["step"])))
+    return curve
+
+
+def _model(folder: Path, train: dict[str, Any], megabytes: int) -> list[tuple[Path, str | None]]:
+    """The files of the model, where all of them together are no larger than this."""
+    files = [folder / name for name in train.get("files", {}) if Path(name).name == name]
+    files = [file for file in files if file.is_file() and not file.is_symlink()]
+    if sum(file.stat().st_size for file in files) > megabytes * MB:
+        return []
+    return [(file, "model") for file in files]

@@ -1,0 +1,169 @@
+"""Logs a study's cells while it runs: one process that imports MLflow once, when the first cell has been scored.
+
+It looks at the cells' scores every few seconds, does nothing where nothing is new, and gives up for a while where the
+store does not answer or is locked: the end of the study takes up what is missing (`_tracking.track`).
+"""
+
+import contextlib
+import os
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
+
+from ..common import holding
+from ..common.cells import RECORDS, cell_folder, cell_name
+from ..common.errors import UserError
+from ..common.files import write_json
+from ..common.settings import Tracking
+from . import _tracking_errors
+from ._about import About
+from ._tracked_cell import StudyCells
+from ._tracked_study import Tracked
+from ._tracked_summary import Group, by_group, group_of
+from ._tracking import explained, open_log
+
+LOOK_S = 4.0  # between two looks
+SETTLE_S = 8.0  # from when a score is seen to when it is logged, so that a study of seconds need not import MLflow
+AWAY_S = 30.0  # before a store that did not take a cell is asked again
+RETRIES, WAIT_S = 1, 5.0  # of one request, and for a database that another holds
+
+Stamp = tuple[int, int]  # of a file: when it was written, and its length
+
+
+class Follower:
+    """What one such process knows. `cells` is the grid; those named in `stale` are about to be made anew."""
+
+    def __init__(
+        self,
+        about: About,
+        cells: Sequence[Mapping[str, str]],
+        results: Path,
+        tracking: Tracking,
+        stale: Collection[str] = (),
+        say: Callable[[str], None] = lambda text: None,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        self.about, self.results, self.tracking, self.say, self.clock = about, results, tracking, say, clock
+        self.source = StudyCells(about, results, tracking)
+        self.cells = {cell_name(cell): cell for cell in cells}
+        self.groups = by_group(cells)
+        self.over = {name: stamp for name in stale if name in self.cells and (stamp := self._stamp(name))}
+        self.seen: dict[str, tuple[Stamp, float]] = {}  # scores that are not logged, and since when they are there
+        self.logged: set[str] = set()
+        self.tracked: Tracked | None = None
+        self.again = 0.0  # when a store that was away is asked again
+        self.said = ""
+        self.began, self.longest_s = time.time(), 0.0  # from a score of this time on to its run
+
+    def go_on(self, stopped: Callable[[float], bool]) -> None:
+        """Until `stopped`, which waits for so many seconds and then says whether it is time to end."""
+        while not stopped(LOOK_S):
+            due = self.due()
+            if due and self.clock() >= self.again:
+                self.log(due, lambda: stopped(0))
+
+    def due(self) -> list[str]:
+        """Names of the cells to log now."""
+        now, due = self.clock(), []
+        for name in self.cells:
+            stamp = self._stamp(name)
+            if stamp is None or self.over.get(name) == stamp:
+                continue
+            if name not in self.seen or self.seen[name][0] != stamp:
+                self.seen[name] = (stamp, now)
+            if now - self.seen[name][1] >= SETTLE_S:
+                due.append(name)
+        return due
+
+    def log(self, names: Sequence[str], stopped: Callable[[], bool] = lambda: False) -> None:
+        """Logs these cells, and the points of summaries that are complete now; raises nothing that goes wrong."""
+        try:
+            # Nobody else logs this study meanwhile; what another does is not waited for.
+            with holding.alone(self.results / "logs" / "track", patience_s=0), explained(self.tracking.uri):
+                tracked = self._open()
+                touched = {}
+                for name in names:
+                    if stopped():
+                        return
+                    stamp = self._stamp(name)
+                    self.logged.discard(name)
+                    if stamp and self._cell(tracked, name):
+                        self.logged.add(name)
+                        self._note_lag(stamp)
+                        touched[group_of(self.cells[name])] = None
+                    if stamp:
+                        self.over[name] = stamp
+                for group in touched:
+                    self._summary(tracked, group)
+                self.said = ""
+        except UserError as error:
+            self.tracked = None  # which may know less than what is there
+            self.again = self.clock() + AWAY_S
+            if str(error) != self.said:
+                self.said = str(error)
+                self.say(f"{error}; trying again")
+        self._account()
+
+    def _open(self) -> Tracked:
+        if self.tracked is None:
+            log = open_log(self.about.name, self.tracking, RETRIES, WAIT_S)
+            log.start()
+            self.tracked = Tracked(self.about, self.source, log)
+            self.tracked.describe()
+        return self.tracked
+
+    def _cell(self, tracked: Tracked, name: str) -> bool:
+        """Whether the cell has its run. One that another job is making anew, and one that MLflow does not take, is left
+        to its next score or to the end of the study."""
+        try:
+            if not self.source.coherent(self.cells[name]):
+                return False
+            tracked.cell(self.cells[name])
+        except (UserError, *_tracking_errors.errors()) as error:
+            if _tracking_errors.kind(error) is not _tracking_errors.Kind.CELL:
+                raise
+            self.say(f"{name}: {_tracking_errors.words(error, self.tracking.uri)}")
+            return False
+        return True
+
+    def _summary(self, tracked: Tracked, group: Group) -> None:
+        """Adds the ratios of a summary all of whose seeds have been logged, by this process or before it."""
+        ratios: dict[str, list[Mapping[str, str]]] = {}
+        for cell in self.groups[group]:
+            ratios.setdefault(cell["ratio"], []).append(cell)
+        whole = [cell for here in ratios.values() if all(map(self._is_logged, here)) for cell in here]
+        if whole:
+            tracked.summary(group, whole)
+
+    def _is_logged(self, cell: Mapping[str, str]) -> bool:
+        name = cell_name(cell)
+        return name in self.logged and self.over.get(name) == self._stamp(name)
+
+    def _stamp(self, name: str) -> Stamp | None:
+        """Of the cell's score; None where there is none, or nothing yet to describe its scene by."""
+        cell = self.cells[name]
+        try:
+            if not (self.results / "scenes" / f"{cell['scene']}.json").is_file():
+                return None
+            found = (cell_folder(self.results, cell) / [*RECORDS][-1]).stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_size
+
+    def _note_lag(self, stamp: Stamp) -> None:
+        scored = stamp[0] / 1e9
+        if scored > self.began:
+            self.longest_s = max(self.longest_s, time.time() - scored)
+
+    def _account(self) -> None:
+        """What this process has cost so far, for who wants to know."""
+        with contextlib.suppress(OSError):
+            write_json(
+                self.results / "logs" / "track" / "follow.json",
+                {
+                    "pid": os.getpid(),
+                    "cells": len(self.logged),
+                    "cpu_s": time.process_time(),
+                    "longest_s": self.longest_s,
+                },
+            )
