@@ -9,7 +9,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from ..common.bounded import in_words
 from ..common.errors import UserError
 from ..scenes.image_files import is_file, leaves, open_image
 from ._thumbnails import font, shortened
@@ -97,7 +96,7 @@ def encoded(image: Any, ending: str = JPEG) -> bytes:
     JPEG, for photographs: it takes a quarter of PNG's time. PNG for drawings.
     """
     if ending == PNG:
-        return _saved(image, "PNG", compress_level=6)
+        return _saved(image, "PNG", compress_level=3)
     content = b""
     for quality in QUALITIES:
         # 4:4:4: the words and the squares of enlarged pixels stay sharp.
@@ -159,7 +158,7 @@ def _shown(image: Any) -> Any:
         return image.resize((times * image.width, times * image.height), Image.Resampling.NEAREST)
     if longest <= LARGEST:
         return image
-    small = [max(1, round(side * LARGEST / longest)) for side in image.size]
+    small = tuple(max(1, round(side * LARGEST / longest)) for side in image.size)
     return image.resize(small, Image.Resampling.BOX)
 
 

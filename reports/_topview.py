@@ -53,4 +53,4 @@ def limits(cameras: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndar
 def round_length(most: float) -> float:
     """The longest of 1, 2, 5, 10, … and their tenths that is no more than `most`, which is positive."""
     power = 10 ** np.floor(np.log10(most))
-    return float(max(step * power for step in (1, 2, 5) if step * power <= most))
+    return float(max((step * power for step in (1, 2, 5) if step * power <= most), default=power))
