@@ -22,7 +22,7 @@ FRAMES = 5_000  # cameras of each kind that are drawn, of more at equal steps
 SHADES = np.array([255, 229, 217, 206, 196, 188], dtype=np.uint8)  # of so many points on a pixel: walls stand out
 LARGEST = 1e12  # of a coordinate: its square has digits left
 PATH, TEST = "#A6A6A6", "#444444"
-BAR = 150  # pixels kept for the scale bar beside the title
+BAR = 170  # pixels kept for the scale bar beside the title
 # Radii and lengths in pixels of the picture.
 POINT, FRAME, CHOSEN, DIAMOND, TICK = 1.5, 1.4, 3.6, 4.5, 15.0
 
