@@ -3,6 +3,7 @@
 By Pillow and numpy alone, in milliseconds: a tracker draws it while the study runs.
 """
 
+import functools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,46 +29,80 @@ POINT, FRAME, CHOSEN, DIAMOND, TICK = 1.5, 1.4, 3.6, 4.5, 15.0
 
 
 @dataclass(frozen=True)
-class _Room:
-    """The scene in pixels of the fine picture, (N, 2), y downwards."""
+class Room:
+    """What the pictures of one scene have in common; places are pixels of the fine picture, (N, 2), y downwards."""
 
     name: str
-    size: tuple[int, int]
+    image: Any  # PIL, RGB, the fine picture: points, path and test cameras
     train: np.ndarray
     looks: np.ndarray  # (N, 2) what is level of each viewing direction, at most 1 long
-    test: np.ndarray
-    points: np.ndarray
     unit: float  # pixels of a scene unit
+    has_points: bool
 
 
-def cameras(description: Any, selection: Any, colour: str, name: str = "") -> Any:
-    """A PIL image, RGB, 640 pixels wide and at most 640 high: the scene's points from above, faint, darker where many
-    lie over one another as they do in walls, the path and the frames of the training split grey, the test cameras as
-    hollow diamonds, and the chosen ones as discs of `colour` (`#RRGGBB`, the selector's) with a line along their
-    viewing direction, short where they look up or down. Both axes have one scale.
+def room_of(description: Any) -> Room:
+    """The scene from above, of the record of results/STUDY/scenes/SCENE.json: its points faint, darker where many lie
+    over one another as they do in walls, the path and the frames of the training split grey, the test cameras hollow
+    diamonds. Both axes have one scale.
 
-    `description` is the record of results/STUDY/scenes/SCENE.json, `selection` that of a cell's selection.json; `name`
-    is what the study calls the selector, whose own name the selection has. Pictures of one scene have one size and one
-    place for each camera, whatever is chosen. Points that are no finite numbers are left out; a scene without any,
-    with one camera or with all at one place is drawn as well. Of more than FRAMES cameras some are drawn. Raises
-    UserError for a record that has no cameras, has some that are no finite numbers, or chooses one that is not there.
+    Points that are no finite numbers are left out; a scene without any, with one camera or with all at one place is
+    drawn as well. Of more than FRAMES cameras some are drawn. Raises UserError for a record that has no cameras or
+    some that are no finite numbers.
+    """
+    from PIL import Image, ImageDraw
+
+    name = description.get("scene") if isinstance(description, dict) else None
+    name = name if isinstance(name, str) else "scene"
+    train, forward = _rows(description, name, "train", "positions"), _rows(description, name, "train", "forward")
+    test = _rows(description, name, "test", "positions")
+    if not len(train) or train.shape != forward.shape:
+        raise _wrong(name, f"{len(train)} training cameras and {len(forward)} viewing directions")
+    lengths = np.linalg.norm(forward, axis=1, keepdims=True)
+    if not lengths.all():
+        raise _wrong(name, "a viewing direction of no length")
+    forward = forward / lengths
+    axes = _topview.plane(train, forward)
+    middle = train.mean(axis=0)
+    at, tests, points = ((rows - middle) @ axes.T for rows in (train, test, _points(description)))
+    low, high = _topview.limits(np.vstack([at, tests]), points)
+    unit = FINE * min((WIDTH - 2 * MARGIN) / (high - low)[0], TALLEST / (high - low)[1])
+    size = (FINE * WIDTH, FINE * (round(unit / FINE * (high - low)[1]) + 2 * MARGIN))
+    within = np.all((points >= low) & (points <= high), axis=1)
+
+    def pixels(flat: np.ndarray) -> np.ndarray:
+        return (flat - (low + high) / 2) * [unit, -unit] + np.array(size) / 2
+
+    shades = Image.fromarray(_shade(pixels(points[within]), size[0] // FINE, size[1] // FINE))
+    image = shades.resize(size, Image.Resampling.NEAREST).convert("RGB")
+    pen, path = ImageDraw.Draw(image), pixels(at)
+    for piece in _topview.pieces(_some(path)):
+        if len(piece) > 1:
+            pen.line(piece.ravel().tolist(), fill=PATH, width=FINE)
+    for box in _around(_some(path), FRAME):
+        pen.ellipse(box, fill=PATH)
+    for box in _around(_some(pixels(tests)), DIAMOND):
+        _diamond(pen, box)
+    return Room(name, image, path, (forward @ axes.T) * [1, -1], unit, bool(within.any()))
+
+
+def cameras(scene: Any, selection: Any, colour: str, name: str = "") -> Any:
+    """A PIL image, RGB, 640 pixels wide and at most 640 high: the scene from above, the chosen cameras as discs of
+    `colour` (`#RRGGBB`, the selector's), each with a line along its viewing direction, short where it looks up or down.
+
+    `scene` is a description or what `room_of` made of it, which is most of the work and the same for all cells;
+    `selection` is the record of a cell's selection.json; `name` is what the study calls the selector, whose own name
+    the selection has. Pictures of one scene have one size and one place for each camera, whatever is chosen.
+
+    Raises UserError as `room_of` does, and for a choice of a camera that is not there.
     """
     from PIL import Image, ImageDraw
 
     if not isinstance(colour, str) or not re.fullmatch(r"#[0-9A-Fa-f]{6}", colour):
         raise UserError(f"'{str(colour)[:40]}' is no colour; expected one such as '#0072B2'")
-    room = _room(description)
+    room = scene if isinstance(scene, Room) else room_of(scene)
     chosen = _chosen(selection, len(room.train), room.name)
-    image = Image.fromarray(_shade(room)).resize(room.size, Image.Resampling.NEAREST).convert("RGB")
-    pen = ImageDraw.Draw(image)
-    for piece in _topview.pieces(_some(room.train)):
-        if len(piece) > 1:
-            pen.line(piece.ravel().tolist(), fill=PATH, width=FINE)
-    for box in _around(_some(room.train), FRAME):
-        pen.ellipse(box, fill=PATH)
-    for box in _around(_some(room.test), DIAMOND):
-        _diamond(pen, box)
-    shown = _some(chosen)
+    image = room.image.copy()
+    pen, shown = ImageDraw.Draw(image), _some(chosen)
     tips = room.train[shown] + FINE * TICK * room.looks[shown]
     for ends in np.hstack([room.train[shown], tips]).tolist():
         pen.line(ends, fill=colour, width=round(1.5 * FINE))
@@ -78,19 +113,18 @@ def cameras(description: Any, selection: Any, colour: str, name: str = "") -> An
     page.paste(small, (0, TITLE))
     selector = name or selection.get("selector")
     words = f"{selector if isinstance(selector, str) else 'selection'}: {len(chosen)} of {len(room.train)} views"
-    _title(page, f"{words} · {room.name}", room)
-    _legend(page, colour, len(room.points) > 0)
+    _title(page, f"{words} · {room.name}", room.unit / FINE)
+    page.paste(_legend(colour, room.has_points), (0, page.height - LEGEND))
     return page
 
 
-def _shade(room: _Room) -> np.ndarray:
-    """(H, W) uint8: the points at the size of the picture."""
-    width, height = room.size[0] // FINE, room.size[1] // FINE
+def _shade(points: np.ndarray, width: int, height: int) -> np.ndarray:
+    """(H, W) uint8: the points, in pixels of the fine picture, at the size of the picture."""
     reach = int(POINT)
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1]
     inside = x**2 + y**2 <= POINT**2
-    xs = (room.points[:, :1] // FINE).astype(np.int64) + x[inside]
-    ys = (room.points[:, 1:] // FINE).astype(np.int64) + y[inside]
+    xs = (points[:, :1] // FINE).astype(np.int64) + x[inside]
+    ys = (points[:, 1:] // FINE).astype(np.int64) + y[inside]
     fits = (xs >= 0) & (ys >= 0) & (xs < width) & (ys < height)
     counts = np.bincount(ys[fits] * width + xs[fits], minlength=width * height)
     return SHADES[np.minimum(counts, len(SHADES) - 1)].reshape(height, width)
@@ -111,13 +145,12 @@ def _diamond(pen: Any, box: tuple[float, float, float, float]) -> None:
     pen.line([x, top, right, y, x, bottom, left, y, x, top, right, y], fill=TEST, width=FINE, joint="curve")
 
 
-def _title(page: Any, words: str, room: _Room) -> None:
+def _title(page: Any, words: str, unit: float) -> None:
     """The words, and a bar of a round length, in scene units (metres where the capture is metric)."""
     from PIL import ImageDraw
 
     pen = ImageDraw.Draw(page)
     write(pen, (MARGIN, 7), words, WIDTH - 3 * MARGIN - BAR, INK, 15)
-    unit = room.unit / FINE
     length = _topview.round_length((BAR - 60) / unit)
     words = f"{length:g} unit{'' if length == 1 else 's'}"
     letters = letters_of(11)
@@ -126,7 +159,8 @@ def _title(page: Any, words: str, room: _Room) -> None:
     pen.line([right - 5 - length * unit, TITLE / 2 + 2, right - 5, TITLE / 2 + 2], fill=INK, width=2)
 
 
-def _legend(page: Any, colour: str, has_points: bool) -> None:
+@functools.lru_cache(maxsize=64)
+def _legend(colour: str, has_points: bool) -> Any:
     from PIL import Image, ImageDraw
 
     tall = FINE * LEGEND
@@ -157,33 +191,7 @@ def _legend(page: Any, colour: str, has_points: bool) -> None:
         x += 14 * FINE
         pen.text((x, y), words, font=letters, fill=GREY, anchor="lm")
         x += letters.getlength(words) + 16 * FINE
-    page.paste(image.reduce(FINE), (0, page.height - LEGEND))
-
-
-def _room(description: Any) -> _Room:
-    name = description.get("scene") if isinstance(description, dict) else None
-    name = name if isinstance(name, str) else "scene"
-    train, forward = _rows(description, name, "train", "positions"), _rows(description, name, "train", "forward")
-    test = _rows(description, name, "test", "positions")
-    if not len(train) or train.shape != forward.shape:
-        raise _wrong(name, f"{len(train)} training cameras and {len(forward)} viewing directions")
-    lengths = np.linalg.norm(forward, axis=1, keepdims=True)
-    if not lengths.all():
-        raise _wrong(name, "a viewing direction of no length")
-    forward = forward / lengths
-    axes = _topview.plane(train, forward)
-    middle = train.mean(axis=0)
-    at, tests, points = ((rows - middle) @ axes.T for rows in (train, test, _points(description)))
-    low, high = _topview.limits(np.vstack([at, tests]), points)
-    unit = FINE * min((WIDTH - 2 * MARGIN) / (high - low)[0], TALLEST / (high - low)[1])
-    size = (FINE * WIDTH, FINE * (round(unit / FINE * (high - low)[1]) + 2 * MARGIN))
-    within = np.all((points >= low) & (points <= high), axis=1)
-
-    def pixels(flat: np.ndarray) -> np.ndarray:
-        return (flat - (low + high) / 2) * [unit, -unit] + np.array(size) / 2
-
-    looks = (forward @ axes.T) * [1, -1]
-    return _Room(name, size, pixels(at), looks, pixels(tests), pixels(points[within]), unit)
+    return image.reduce(FINE)
 
 
 def _rows(description: Any, name: str, split: str, part: str) -> np.ndarray:
