@@ -36,7 +36,7 @@ class Room:
     image: Any  # PIL, RGB, the fine picture: points, path and test cameras
     train: np.ndarray
     looks: np.ndarray  # (N, 2) what is level of each viewing direction, at most 1 long
-    unit: float  # pixels of a scene unit
+    unit: float  # pixels of a scene unit; 0 where all that is drawn is at one place
     has_points: bool
 
 
@@ -82,7 +82,8 @@ def room_of(description: Any) -> Room:
         pen.ellipse(box, fill=PATH)
     for box in _around(_some(pixels(tests)), DIAMOND):
         _diamond(pen, box)
-    return Room(name, image, path, (forward @ axes.T) * [1, -1], unit, bool(within.any()))
+    is_wide = within.any() or np.ptp(np.vstack([at, tests]), axis=0).max() > _topview.SMALLEST
+    return Room(name, image, path, (forward @ axes.T) * [1, -1], unit * bool(is_wide), bool(within.any()))
 
 
 def cameras(scene: Any, selection: Any, colour: str, name: str = "") -> Any:
@@ -151,6 +152,8 @@ def _title(page: Any, words: str, unit: float) -> None:
 
     pen = ImageDraw.Draw(page)
     write(pen, (MARGIN, 7), words, WIDTH - 3 * MARGIN - BAR, INK, 15)
+    if not unit:
+        return
     length = _topview.round_length((BAR - 60) / unit)
     words = f"{length:g} unit{'' if length == 1 else 's'}"
     letters = letters_of(11)

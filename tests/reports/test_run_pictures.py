@@ -20,7 +20,7 @@ from tests.fuzz._odd import VALUES
 from viewbench.common.errors import UserError
 from viewbench.common.files import read_json
 from viewbench.reports import _run_pictures as pictures
-from viewbench.reports._run_cameras import SHADES, cameras, room_of
+from viewbench.reports._run_cameras import FRAMES, SHADES, _some, cameras, room_of
 from viewbench.scenes.pictures import picture_name, save_png
 
 from .fixtures import make_study
@@ -136,6 +136,13 @@ def test_a_large_strip_is_bounded_in_pixels_and_bytes_and_keeps_means(tmp_path):
     assert len(content) <= pictures.BYTES
     static = Image.fromarray(noise(680, 1932))  # worse than any picture
     assert len(pictures.encoded(static)) <= pictures.BYTES
+
+
+def test_a_reduced_pixel_is_the_mean_of_what_it_covers(tmp_path):
+    squares = np.indices((1280, 1280)).sum(axis=0)[..., None].repeat(3, axis=-1) % 2
+    drawn, truth = (saved(tmp_path / f"{level}.png", level * squares) for level in (200, 160))
+    for panel, level in zip(panels(pictures.strip(drawn, truth, ""), (640, 640)), (80, 100, 4 * 20), strict=True):
+        assert np.abs(panel - level).max() <= 1
 
 
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 9000), (9000, 1), (700, 3)])
@@ -381,6 +388,43 @@ def test_one_camera_and_cameras_at_one_place_are_drawn(room):
             assert image.width == 640
             assert image.height <= 640
             assert bool(len(like(image, BLUE))) == bool(choice["indices"])
+
+
+def test_the_scale_bar_is_as_long_as_it_says(room):
+    positions, forward = walk()
+    forward[[0, 30]] = [0, 0, -1]
+    first, last = (cameras(scene(positions, forward), chosen(k), BLUE) for k in (0, 30))
+    unit = (like(first, BLUE).mean(axis=0) - like(last, BLUE).mean(axis=0))[0] / 6
+    dark = (np.asarray(first.convert("L"))[17, 320:] < 60).astype(int)
+    edges = np.flatnonzero(np.diff(np.pad(dark, 1)))
+    bar = max(edges[1::2] - edges[::2])
+    assert min(abs(bar - length * unit) for length in (0.5, 1, 2, 5)) < 2
+    still = cameras(scene([[1, 2, 3]] * 40, walk(40)[1]), chosen(0), BLUE)
+    assert not (np.asarray(still.convert("L"))[:30, 400:] < 200).any()
+
+
+def test_a_tripod_shows_the_room_around_it(room):
+    look = walk(40)[1]
+    description = scene([[2.5, 2, 1.5]] * 40, look, points=[[float("nan")] * 6, *room["points"]])
+    image = cameras(description, chosen(0, 11), BLUE)
+    assert (np.asarray(image) == SHADES[1]).all(axis=-1).sum() > 1000
+
+
+def test_a_viewing_direction_of_no_length_is_refused():
+    positions, forward = walk(12)
+    for bad in (0.0, 1e-200, float("nan"), float("inf"), 1e300):
+        forward[5] = bad
+        with pytest.raises(UserError, match="description of scene 'made'"):
+            cameras(scene(positions, forward), chosen(1), BLUE)
+
+
+@given(st.integers(0, 5 * FRAMES))
+@settings(max_examples=50, deadline=None)
+def test_of_many_cameras_some_are_drawn_at_equal_steps(total):
+    some = _some(np.arange(total))
+    assert min(total, FRAMES // 2) <= len(some) <= FRAMES
+    assert len(set(np.diff(some))) <= 1
+    assert total > FRAMES or len(some) == total
 
 
 def test_many_cameras_are_drawn_in_part():

@@ -70,3 +70,10 @@ def test_limits_have_the_cameras_and_the_walls_around_them_and_nothing_far_away(
     assert (high - low).max() < 8
     low, high = limits(np.zeros((3, 2)), np.zeros((0, 2)))
     assert (high > low).all()
+    low, high = limits(np.zeros((3, 2)), np.vstack([3 * walls, 50 * away, 60 * away]))
+    assert ((low < 0) & (high > 0)).all()
+    low, high = limits(np.zeros((9, 2)), np.vstack([walls, 1.1 * walls, away]))
+    for point in walls:
+        assert (low <= point).all()
+        assert (point <= high).all()
+    assert (high - low).max() < 20
