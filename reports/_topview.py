@@ -3,6 +3,8 @@
 import numpy as np
 
 SNAP_DEGREES = 20.0  # an up within this of a coordinate axis is that axis: rooms then stand square on the page
+SMALLEST = 1e-6  # scene units between cameras that are not at one place
+NEAR = 0.3  # scene points this far from the cameras are still shown, as a part of the cameras' extent
 
 
 def plane(positions: np.ndarray, forward: np.ndarray) -> np.ndarray:
@@ -36,3 +38,24 @@ def pieces(path: np.ndarray, share: float = 0.08) -> list[np.ndarray]:
     extent = np.ptp(path, axis=0).max()
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     return np.split(path, np.flatnonzero(steps > share * extent) + 1)
+
+
+def limits(cameras: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner of what is shown: the cameras' box with room for arrows, never thinner than 2 : 5, grown
+    to the points around it (walls) where they are near. Of cameras at one place, as on a tripod, the nearer half of
+    the points is."""
+    low, high = cameras.min(axis=0), cameras.max(axis=0)
+    extent = (high - low).max()
+    if extent < SMALLEST and len(points):
+        extent = 2 * float(np.median(np.abs(points - low).max(axis=1)))
+    extent = max(extent, SMALLEST)
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.2 * extent) + 0.08 * extent
+    near = points[np.all(np.abs(points - middle) < half + NEAR * extent, axis=1)]
+    around = np.vstack([middle - half, middle + half, near])
+    return around.min(axis=0), around.max(axis=0)
+
+
+def round_length(most: float) -> float:
+    """The longest of 1, 2, 5, 10, … and their tenths that is no more than `most`, which is positive."""
+    power = 10 ** np.floor(np.log10(most))
+    return float(max((step * power for step in (1, 2, 5) if step * power <= most), default=power))

@@ -14,7 +14,6 @@ from ._study import Cell, SceneInfo, Study, percent
 from ._style import Style, styles
 
 ORDER = 30
-NEAR = 0.3  # scene points this far from the cameras are still shown, as a part of the cameras' extent
 
 
 def build(study: Study, out: Path) -> list[Item]:
@@ -36,7 +35,7 @@ def _figure(study: Study, scene: SceneInfo, cells: list[Cell], out: Path) -> Ite
     points = np.array(scene.points, dtype=float).reshape(-1, 6)[:, :3]
     plane = _topview.plane(train, forward)
     flat_train, flat_test, flat_points = train @ plane.T, test @ plane.T, points @ plane.T
-    low, high = _limits(np.vstack([flat_train, flat_test]), flat_points)
+    low, high = _topview.limits(np.vstack([flat_train, flat_test]), flat_points)
     aspect = (high - low)[1] / (high - low)[0]
     drawn = styles(study.selectors)
     records = _records("path", scene.name, range(len(train)), train, forward)
@@ -95,22 +94,10 @@ def _chosen(axes: Axes, at: np.ndarray, looks: np.ndarray, style: Style, extent:
     )
 
 
-def _limits(cameras: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corner of what is shown: the cameras' box with room for arrows, never thinner than 2 : 5, grown
-    to the points around it (walls) where they are near."""
-    low, high = cameras.min(axis=0), cameras.max(axis=0)
-    extent = max((high - low).max(), 1e-6)
-    middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.2 * extent) + 0.08 * extent
-    near = points[np.all(np.abs(points - middle) < half + NEAR * extent, axis=1)]
-    around = np.vstack([middle - half, middle + half, near])
-    return around.min(axis=0), around.max(axis=0)
-
-
 def _scale_bar(axes: Axes, low: np.ndarray, high: np.ndarray) -> None:
     """A bar of a round length, in scene units (metres where the capture is metric)."""
     extent = high[0] - low[0]
-    power = 10 ** np.floor(np.log10(extent / 4))
-    length = max(step * power for step in (1, 2, 5) if step * power <= extent / 4)
+    length = _topview.round_length(extent / 4)
     x, y = low[0] + 0.04 * extent, low[1] + 0.04 * (high[1] - low[1])
     axes.plot([x, x + length], [y, y], color="black", linewidth=1.5, solid_capstyle="butt")
     label = f"{length:g} unit" if length == 1 else f"{length:g} units"

@@ -4,8 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from viewbench.reports._topview import pieces, plane
+from viewbench.reports._topview import limits, pieces, plane, round_length
 
 from .fixtures import ROOM
 
@@ -48,3 +50,30 @@ def test_pieces_cut_at_jumps_and_lose_no_view():
     assert [len(piece) for piece in cut] == [100, 100]
     np.testing.assert_array_equal(np.vstack(cut), path)
     assert len(pieces(np.zeros((5, 2)))) == 1
+
+
+@given(st.floats(1e-9, 1e12))
+def test_a_round_length_is_the_longest_of_1_2_5_that_fits(most):
+    length = round_length(most)
+    assert length <= most * (1 + 1e-12)
+    assert length > most * 0.4 * (1 - 1e-9)
+    assert f"{length:.6e}"[:8] in ("1.000000", "2.000000", "5.000000")
+
+
+def test_limits_have_the_cameras_and_the_walls_around_them_and_nothing_far_away():
+    cameras = np.array([[0.0, 0], [4, 0], [4, 1]])
+    walls, away = np.array([[-1.0, -1], [5, 2]]), np.array([[40.0, 0], [0, -40]])
+    low, high = limits(cameras, np.vstack([walls, away]))
+    for point in (*cameras, *walls):
+        assert (low <= point).all()
+        assert (point <= high).all()
+    assert (high - low).max() < 8
+    low, high = limits(np.zeros((3, 2)), np.zeros((0, 2)))
+    assert (high > low).all()
+    low, high = limits(np.zeros((3, 2)), np.vstack([3 * walls, 50 * away, 60 * away]))
+    assert ((low < 0) & (high > 0)).all()
+    low, high = limits(np.zeros((9, 2)), np.vstack([walls, 1.1 * walls, away]))
+    for point in walls:
+        assert (low <= point).all()
+        assert (point <= high).all()
+    assert (high - low).max() < 20
