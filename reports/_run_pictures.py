@@ -23,7 +23,7 @@ PIXELS = 40_000_000  # of a render that is drawn: 8K has 33 million
 BYTES = 1_000_000  # of a picture as it is written
 LONGEST = 240  # letters of a line: no strip has room for more
 SHAPE = 0.02  # share by which a truth's width to height may be another than the render's: sizes are whole pixels
-QUALITIES = (90, 70, 40, 15)  # of JPEG, tried until the picture is within BYTES
+QUALITIES = (80, 60, 40, 15)  # of JPEG, tried until the picture is within BYTES
 # MLflow shows .jpg, .jpeg, .png, .gif, .bmp and .svg as pictures, and offers .webp for download.
 JPEG, PNG = ".jpg", ".png"
 
@@ -99,8 +99,8 @@ def encoded(image: Any, ending: str = JPEG) -> bytes:
         return _saved(image, "PNG", compress_level=3)
     content = b""
     for quality in QUALITIES:
-        # 4:4:4: the words and the squares of enlarged pixels stay sharp.
-        content = _saved(image, "JPEG", quality=quality, subsampling=0)
+        # 4:2:2: a third of the time that full colour takes, and squares of enlarged pixels are two wide at least.
+        content = _saved(image, "JPEG", quality=quality, subsampling=1)
         if len(content) <= BYTES:
             break
     return content

@@ -67,13 +67,18 @@ class StudyCells:
 
     def __init__(self, about: About, results: Path, tracking: Tracking):
         self.about, self.results, self.tracking = about, results, tracking
-        self._scenes: dict[str, tuple[Any, dict[str, Any]]] = {}
+        self._scenes: dict[str, tuple[Any, dict[str, Any]]] = {}  # by name, with what was read when
+        self._rooms: dict[str, tuple[Any, Any]] = {}
+        self._facts: dict[str, tuple[Any, Facts]] = {}
 
     def facts(self, cell: Mapping[str, str]) -> Facts:
-        """From the cell's records."""
-        folder = cell_folder(self.results, cell)
+        """From the cell's records, which are read once."""
+        folder, name = cell_folder(self.results, cell), cell_name(cell)
         with _explained(cell):
-            return _facts(cell, folder, *read_records(folder))
+            stamps = [_stamp(folder / file) for file in RECORDS]
+            if self._facts.get(name, (None,))[0] != stamps:
+                self._facts[name] = (stamps, _facts(cell, folder, *read_records(folder)))
+            return self._facts[name][1]
 
     def fingerprint(self, cell: Mapping[str, str]) -> str:
         """The hash of its records, of what the run is called, and of which files it gets."""
@@ -105,13 +110,21 @@ class StudyCells:
         """As `viewbench describe` wrote it; read again when that has written another one."""
         path = self.results / "scenes" / f"{name}.json"
         with contextlib.suppress(UserError, RecursionError, OSError):
-            found = path.stat()
-            stamp = (found.st_mtime_ns, found.st_size)
+            stamp = _stamp(path)
             if self._scenes.get(name, (None, {}))[0] != stamp:
                 record = read_json(path, "scene description")
                 self._scenes[name] = (stamp, record if isinstance(record, dict) else {})
             return self._scenes[name][1]
         return {}
+
+    def _room(self, name: str) -> Any:
+        """What all figures of a scene's cameras share. Raises UserError for a description that cannot be drawn."""
+        from . import _run_cameras
+
+        record = self.scene(name)
+        if self._rooms.get(name, (None,))[0] is not record:
+            self._rooms[name] = (record, _run_cameras.room_of(record))
+        return self._rooms[name][1]
 
     def coherent(self, cell: Mapping[str, str]) -> bool:
         """Whether the score is of the model, and the model of the choice, that lie beside it: none is made anew."""
@@ -139,8 +152,8 @@ class StudyCells:
                 path.write_bytes(_run_pictures.encoded(strip))
                 files.append((path, "renders"))
         with contextlib.suppress(UserError):
-            colour = self.about.colours[cell["selector"]]
-            figure = _run_cameras.cameras(self.scene(cell["scene"]), selection, colour)
+            name = cell["selector"]
+            figure = _run_cameras.cameras(self._room(cell["scene"]), selection, self.about.colours[name], name)
             path = drawn / f"cameras{_run_pictures.PNG}"
             path.write_bytes(_run_pictures.encoded(figure, _run_pictures.PNG))
             files.append((path, None))
@@ -273,6 +286,12 @@ def _explained(cell: Mapping[str, str]) -> Iterator[None]:
         raise UserError(f"cell {cell_name(cell)} cannot be read: {error.strerror}: {error.filename}") from None
     except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
         raise UserError(f"the files of cell {cell_name(cell)} are not as viewbench writes them ({error!r})") from None
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Tells a file from another one of its name."""
+    found = path.stat()
+    return found.st_mtime_ns, found.st_size
 
 
 def _time(text: Any) -> float | None:

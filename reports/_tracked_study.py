@@ -15,7 +15,6 @@ from ._tracked_summary import Group, group_of, key_of
 from ._tracking_log import TRIES, Key, Log
 
 NOTE = "mlflow.note.content"
-FIGURE = "Figure 4: PSNR over the share of training views"
 KIND_OF_EXPERIMENT = "custom_model_development"  # in MLflow's words; without it the page is one for language models
 
 
@@ -36,8 +35,7 @@ class Tracked:
             "mlflow.experiment.primaryMetric.greaterIsBetter": "True",
         }
         about = self.about
-        panels = [_tracked_view.Panel(about.panel(*panel), about.place(*panel)) for panel in about.panels()]
-        tags |= _tracked_view.tags(FIGURE, panels, self.log.created_ms)
+        tags |= _tracked_view.tags([about.panel(*panel) for panel in about.panels()], self.log.created_ms)
         words = note(about, self.log.experiment, verdict, page)
         if verdict or page or not self.log.tags.get(NOTE, "").startswith(about.title):
             tags[NOTE] = words
@@ -108,7 +106,7 @@ def note(about: About, experiment: str, verdict: Sequence[str] = (), page: str =
 
     MLflow shows the first line alone until one asks for the rest. `page` is the id of the run that has the page.
     """
-    links = [f"[Figure 4]({_tracked_view.link('', experiment).lstrip('/')})"]
+    links = [f"[Figure 4]({_tracked_view.link('', experiment)})"]
     links += [f"[the page](#/experiments/{experiment}/runs/{page}/artifacts/index.html)"] if page else []
     parts = [" · ".join([about.title, *links]), " ".join(verdict), about.description]
     return "\n\n".join(part for part in parts if part)
