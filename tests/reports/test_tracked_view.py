@@ -1,13 +1,16 @@
 """The shared view of a study: what its tags hold, and what MLflow's page draws from them."""
 
 import base64
+import hashlib
 import json
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
-from tests import chromium
+from tests import chromium, screenshots
 from tests.conftest import known
 from viewbench.reports import _tracked_view as view
 
@@ -60,56 +63,97 @@ def test_tags_are_as_short_as_the_oldest_mlflow_wants(panels: int):
 
 
 def test_names_that_no_tag_has_room_for():
-    hashes = [f"psnr_db/{view.hashlib.sha512(bytes([i])).hexdigest()}" for i in range(100)]
+    hashes = [f"psnr_db/{hashlib.sha512(bytes([i])).hexdigest()}" for i in range(100)]
     shown = figure(read(view.tags(hashes, 0)[LINK]))
     assert 10 < len(shown) < 100
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(chromium.find() is None, reason="no Chromium on this machine")
-def test_the_page_draws_the_figure(tmp_path: Path):
-    """A real server and a real browser: the link shows the summary runs alone, each with its colour, over the ratio."""
+RATIOS = {50: 0.5, 100: 1.0, 2000: 20.0}  # steps in hundredths of a percent, percent
+COLOURS = {"maxmin": "#0072b2", "uniform": "#d55e00", "full": "#444444"}
+PANELS = ["psnr_db/room 1", "psnr_db/kitchen-2.b"]
+
+
+def height(panel: str, selector: str) -> list[float]:
+    """What is logged for the panel, of one run."""
+    return [20 + PANELS.index(panel) + (20 if selector == "full" else ratio / 3) for ratio in RATIOS.values()]
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a real server with a study; tests of a page are skipped where there is no browser."""
+    if chromium.find() is None:
+        pytest.skip("no Chromium on this machine")
     mlflow = pytest.importorskip("mlflow")
     from mlflow.entities import Metric, Param
 
     from tests.reports.mlflow_server import Server
 
-    ratios = {50: 0.5, 100: 1.0, 2000: 20.0}  # steps in hundredths of a percent
-    colours = {"maxmin": "#0072b2", "uniform": "#d55e00", "full": "#444444"}
-    server = Server(tmp_path).start()
+    folder = tmp_path_factory.mktemp("view")
+    Image.new("RGB", (64, 48), "teal").save(folder / "view.png")
+    running = Server(folder).start()
     try:
-        client = mlflow.MlflowClient(server.url)
+        client = mlflow.MlflowClient(running.url)
         experiment = client.create_experiment("study")
-        panels = [f"psnr_db/{scene}" for scene in ("room 1", "kitchen-2.b")]
-        want = {panel: {} for panel in panels}
-        for height, panel in enumerate(panels):
-            for selector, colour in colours.items():
+        for panel in PANELS:
+            for selector, colour in COLOURS.items():
                 tags = {view.KIND: view.SUMMARY, "mlflow.runColor": colour}
                 run = client.create_run(experiment, tags=tags, run_name=selector).info.run_id
-                y = [20 + height + ratio / 3 for ratio in ratios.values()] if selector != "full" else [31.0] * 3
-                metrics = [Metric(view.X, ratio, 0, step) for step, ratio in ratios.items()]
+                metrics = [Metric(view.X, ratio, 0, step) for step, ratio in RATIOS.items()]
                 for name in (panel, "psnr_db", "ssim", "train_s"):
-                    metrics += [Metric(name, value, 0, step) for step, value in zip(ratios, y, strict=True)]
+                    values = zip(RATIOS, height(panel, selector), strict=True)
+                    metrics += [Metric(name, value, 0, step) for step, value in values]
                 client.log_batch(run, metrics=metrics, params=[Param("scene", panel), Param("selector", selector)])
-                client.create_run(experiment, tags={"mlflow.parentRunId": run, view.KIND: "cell"}, run_name="a cell")
-                want[panel][colour] = [list(ratios.values()), y]
-        for key, value in view.tags(panels, 0).items():
+                tags = {"mlflow.parentRunId": run, view.KIND: "cell"}
+                cell = client.create_run(experiment, tags=tags, run_name="a cell").info.run_id
+                client.log_artifact(cell, folder / "view.png", "renders")
+        for key, value in view.tags(PANELS, 0).items():
             client.set_experiment_tag(experiment, key, value)
-        with chromium.Page(known(chromium.find()), 1400, 1800) as page:
-            page.open(view.link(server.url, experiment))
-            page.wait("document.querySelectorAll('.js-plotly-plot .scatterlayer .trace').length >= 4 * 3")
-            plots = page.value(
-                "[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot.data.filter(line => line.x?.length)"
-                ".map(line => [line.marker.color, line.mode, [...line.x], [...line.y]]))"
-            )
-            text = page.text()
+        yield running.url
     finally:
-        server.stop()
-    lines = [{colour: [x, y] for colour, mode, x, y in plot if "markers" in mode} for plot in plots[:2]]
-    assert lines == [want[panel] for panel in panels]
-    at = [text.index(words) for words in (view.FIGURE, *panels, view.FURTHER, view.OTHERS)]
+        running.stop()
+
+
+@pytest.mark.slow
+def test_the_page_draws_the_figure(server: str):
+    """The link shows the summary runs alone, each in its colour and over the ratio."""
+    with chromium.Page(known(chromium.find()), 1400, 1800) as page:
+        page.open(view.link(server, screenshots.Study(server, "study").id))
+        page.wait(f"{screenshots.LINES} >= 4 * {len(COLOURS)}")
+        plots = page.value(
+            "[...document.querySelectorAll('.js-plotly-plot')].map(plot => plot.data.filter(line => line.x?.length)"
+            ".map(line => [line.marker.color, line.mode, [...line.x], [...line.y]]))"
+        )
+        text = page.text()
+    lines = [{colour: [x, y] for colour, mode, x, y in plot if "markers" in mode} for plot in plots]
+    ratios = list(RATIOS.values())
+    assert lines[:2] == [{COLOURS[name]: [ratios, height(panel, name)] for name in COLOURS} for panel in PANELS]
+    at = [text.index(words) for words in (view.FIGURE, *PANELS, view.FURTHER, view.OTHERS)]
     assert at == sorted(at)
-    assert "a cell" not in text
     assert "6 matching runs" in text
-    if tuple(map(int, mlflow.__version__.split(".")[:2])) >= (3, 17):
-        assert "shared view" in text
+    assert "a cell" not in text
+
+
+@pytest.mark.slow
+def test_screenshots(server: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    assert screenshots.main([server, str(tmp_path), "--readme", str(tmp_path / "small.png")]) == 0
+    names = [Path(line).name for line in capsys.readouterr().out.splitlines()]
+    assert names == ["runs.png", "figure_4.png", "cell.png", "render.png", "first.png", "small.png"]
+    for name in names:
+        with Image.open(tmp_path / name) as picture:
+            assert picture.size == screenshots.SIZE
+            assert len(known(picture.convert("RGB").getcolors(1 << 24))) > 20  # a blank page has one
+    with Image.open(tmp_path / "figure_4.png") as picture:
+        seen = {colour for _, colour in known(picture.convert("RGB").getcolors(1 << 24))}
+    assert {tuple(bytes.fromhex(colour[1:])) for colour in COLOURS.values()} <= seen
+    with Image.open(tmp_path / "render.png") as picture:
+        assert (0, 128, 128) in {colour for _, colour in known(picture.convert("RGB").getcolors(1 << 24))}
+    assert (tmp_path / "small.png").stat().st_size < 150_000
+
+
+def test_screenshots_without_a_browser(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert screenshots.main(["nothing.db", str(tmp_path / "out")]) == 0
+    assert "no Chromium" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
