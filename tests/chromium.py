@@ -121,8 +121,8 @@ class Page:
         return self.value("document.body ? document.body.innerText : ''") or ""
 
     def picture(self, path: Path) -> None:
-        """Writes the page as a PNG, when it has looked the same for a second; after 20 s also one that moves."""
-        last, same, end = "", 0, time.monotonic() + 20
+        """Writes the page as a PNG, when it has looked the same for a second; after 8 s also one that moves."""
+        last, same, end = "", 0, time.monotonic() + 8
         while same < 4 and time.monotonic() < end:
             time.sleep(0.25)
             now = self.call("Page.captureScreenshot", format="png")["data"]

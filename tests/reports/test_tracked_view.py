@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+import urllib.parse
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -68,6 +69,18 @@ def test_names_that_no_tag_has_room_for():
     assert 10 < len(shown) < 100
 
 
+@pytest.mark.parametrize("server", ["http://127.0.0.1:5000", "https://host/mlflow/", ""])
+def test_links(server: str):
+    """The page's part of an address is after the #, and has no filter: the page would prefer it to the view's."""
+    base, _, rest = view.link(server, "12/x").partition("#")
+    assert base == (server.rstrip("/") + "/" if server else "")
+    path, _, query = rest.partition("?")
+    assert path == "/experiments/12%2Fx/runs"
+    wanted = {"viewStateShareKey": ["viewbench"], "compareRunsMode": ["CHART"], "workflowType": ["machine_learning"]}
+    assert urllib.parse.parse_qs(query) == wanted
+    assert not set(wanted) & set(read(view.tags([], 0)[LINK]))
+
+
 RATIOS = {50: 0.5, 100: 1.0, 2000: 20.0}  # steps in hundredths of a percent, percent
 COLOURS = {"maxmin": "#0072b2", "uniform": "#d55e00", "full": "#444444"}
 PANELS = ["psnr_db/room 1", "psnr_db/kitchen-2.b"]
@@ -106,6 +119,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
                 tags = {"mlflow.parentRunId": run, view.KIND: "cell"}
                 cell = client.create_run(experiment, tags=tags, run_name="a cell").info.run_id
                 client.log_artifact(cell, folder / "view.png", "renders")
+                for one in (cell, run):
+                    client.set_terminated(one)
         for key, value in view.tags(PANELS, 0).items():
             client.set_experiment_tag(experiment, key, value)
         yield running.url
