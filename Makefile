@@ -11,11 +11,12 @@ SOURCES := *.py common scenes selectors backends reports workflow tests
 THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server test-slurm soak hostile fuzz
+.PHONY: help setup dev reports dashboard test packages lint types pytest bench gpu quality size memory external wheels lock audit versions datasheet format clean clean-results test-server test-slurm soak hostile fuzz screenshots
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
 	@echo "make dashboard   MLflow over the runs just made, on http://127.0.0.1:5000"
+	@echo "make screenshots what people see in MLflow of the runs just made: pictures in build/screenshots (needs Chromium)"
 	@echo "make test        linters, type checks and tests"
 	@echo "make soak        a study that is killed 60 times at random moments (half an hour; SOAK='--kills N --seed S')"
 	@echo "make bench       timings, as ratios measured side by side"
@@ -61,6 +62,11 @@ reports: setup
 
 dashboard: setup
 	@$(BIN)/viewbench dashboard
+
+# STORE= may also be the address of a server that runs; SHOTS='--readme reports/mlflow.png' makes the README's picture.
+STORE ?= results/mlflow.db
+screenshots: dev
+	$(BIN)/python -m tests.screenshots $(STORE) build/screenshots $(SHOTS)
 
 test: dev packages lint types pytest
 
