@@ -65,10 +65,10 @@ class About:
         """ "maxmin · room_human"."""
         return f"{selector} · {self.place(backend, scene)}"
 
-    def panel(self, backend: str, scene: str) -> str:
-        """The metric that draws a panel of Figure 4, which has its name: only the summaries of one scene and backend
-        have it."""
-        return f"psnr_db/{scene}" if backend == self.backends[0] else f"psnr_db/{scene}/{backend}"
+    def panel(self, backend: str, scene: str, metric: str = "psnr_db") -> str:
+        """The metric that draws a panel of a figure, which has its name: only the summaries of one scene and backend
+        have it. The paper's Figure 4 has those of `psnr_db`."""
+        return f"{metric}/{scene}" if backend == self.backends[0] else f"{metric}/{scene}/{backend}"
 
     def panels(self) -> list[tuple[str, str]]:
         """(backend, scene) pairs in the order of the grid."""

@@ -11,7 +11,7 @@ from . import _tracked_summary, _tracked_view
 from ._about import About
 from ._tracked_cell import Cells, user
 from ._tracked_run import PARENT, SOURCE, SOURCE_TYPE, USER, Content
-from ._tracked_summary import Group, group_of, key_of
+from ._tracked_summary import PANELS, Group, group_of, key_of
 from ._tracking_log import TRIES, Key, Log
 
 NOTE = "mlflow.note.content"
@@ -35,7 +35,8 @@ class Tracked:
             "mlflow.experiment.primaryMetric.greaterIsBetter": "True",
         }
         about = self.about
-        tags |= _tracked_view.tags([about.panel(*panel) for panel in about.panels()], self.log.created_ms)
+        first, *further = ([about.panel(*place, key) for place in about.panels()] for key in PANELS)
+        tags |= _tracked_view.tags(first, self.log.created_ms, [panel for panels in further for panel in panels])
         words = note(about, self.log.experiment, verdict, page)
         if verdict or page or not self.log.tags.get(NOTE, "").startswith(about.title):
             tags[NOTE] = words

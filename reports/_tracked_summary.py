@@ -17,6 +17,7 @@ from ._tracked_run import Content, Number, params
 Group = tuple[str, str, str]  # backend, scene, selector
 MEANS = ("psnr_db", "ssim", "lpips", "select_s", "train_s", "evaluate_s", "n_primitives")
 SPREADS = ("psnr_db", "ssim")
+PANELS = ("psnr_db", "ssim", "train_s")  # drawn for each scene by itself
 
 
 def group_of(cell: Mapping[str, str]) -> Group:
@@ -74,9 +75,10 @@ def points(group: Group, about: About, cells: Iterable[Facts]) -> dict[str, list
         numbers = [(key, value, stamp, about.step(ratio)) for key, value in values.items()]
         drawn = [ratio, *(about.ratios_of(backend, scene) if selector == FULL else ())]
         numbers += [("ratio_percent", 100 * float(at), stamp, about.step(at)) for at in drawn]
-        if "psnr_db" in values:
-            level = drawn[1:] or drawn
-            numbers += [(about.panel(backend, scene), values["psnr_db"], stamp, about.step(at)) for at in level]
+        for key in PANELS:
+            if key in values:
+                panel = about.panel(backend, scene, key)
+                numbers += [(panel, values[key], stamp, about.step(at)) for at in drawn[1:] or drawn]
         found[ratio] = numbers
     return found
 
