@@ -38,16 +38,17 @@ COLUMNS = (
 def tags(panels: Sequence[str], created_ms: int, further: Sequence[str] = FURTHER_METRICS) -> dict[str, str]:
     """The experiment's tags, by key; `panels` are the metrics of the figure, one a panel, in the order of the panels.
 
-    A panel's title is its metric's name, in all versions. Panels for which a tag has no room (some 150 fit) are left
-    to the page, which draws them below the others, over the step. `created_ms` orders the menu.
+    A panel's title is its metric's name, in all versions. Charts for which a tag has no room (some 150 fit), the
+    `further` ones first, are left to the page, which draws them below the others, over the step. `created_ms` orders
+    the menu.
     """
-    panels = list(dict.fromkeys(panels))
+    panels, further = list(dict.fromkeys(panels)), list(dict.fromkeys(further))
     while True:
-        state = _compressed(_state(panels, list(dict.fromkeys(further))))
+        state = _compressed(_state(panels, further))
         named = json.dumps({"name": FIGURE, "createdAt": created_ms, "state": state})
         if len(named) <= LONGEST or not panels:
             return {PREFIX + KEY: state, PREFIX + KEY + "-menu": named}
-        panels = panels[:-1]
+        panels, further = (panels, further[:-1]) if further else (panels[:-1], further)
 
 
 def link(server: str, experiment_id: str) -> str:
