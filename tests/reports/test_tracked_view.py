@@ -83,6 +83,17 @@ def test_links(server: str):
 
 RATIOS = {50: 0.5, 100: 1.0, 2000: 20.0}  # steps in hundredths of a percent, percent
 COLOURS = {"maxmin": "#0072b2", "uniform": "#d55e00", "full": "#444444"}
+
+
+def test_further_charts_go_before_those_of_the_figure():
+    panels, further = [f"psnr_db/{number:03}" for number in range(60)], [f"ssim/{number:03}" for number in range(400)]
+    found = view.tags(panels, 0, further)
+    assert all(len(value) <= view.LONGEST for value in found.values())
+    drawn = [chart["metricKey"] for chart in read(found[LINK])["compareRunCharts"]]
+    assert drawn[:60] == panels
+    assert 0 < len(drawn) - 60 < 400
+
+
 PANELS = ["psnr_db/room 1", "psnr_db/kitchen-2.b"]
 
 
@@ -172,13 +183,3 @@ def test_screenshots_without_a_browser(
     assert screenshots.main(["nothing.db", str(tmp_path / "out")]) == 0
     assert "no Chromium" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-def test_further_charts_go_before_those_of_the_figure():
-    panels, further = [f"psnr_db/{number:03}" for number in range(60)], [f"ssim/{number:03}" for number in range(400)]
-    found = _tracked_view.tags(panels, 0, further)
-    assert all(len(value) <= _tracked_view.LONGEST for value in found.values())
-    state = json.loads(zlib.decompress(base64.b64decode(found[_tracked_view.PREFIX + _tracked_view.KEY].split(";")[1])))
-    drawn = [chart["metricKey"] for chart in state["compareRunCharts"]]
-    assert drawn[:60] == panels
-    assert 0 < len(drawn) - 60 < 400
