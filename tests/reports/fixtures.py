@@ -188,6 +188,8 @@ def _cell(folder, study, cell, cameras, lpips, broken):
         "threads": 1,
         "peak_rss_bytes": 400_000_000 + 1_000_000 * len(selector),
         "n_primitives": 20000,
+        "commit": "0123456789ab",
+        "scene_sha256": "a" * 64,
         "seeding": {"source": "scene"},
         "curve": curve,
     }
