@@ -1,5 +1,6 @@
 """What MLflow is told of a study besides its cells: words, order, colours, and how a ratio becomes a step."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -8,6 +9,7 @@ from typing import Any
 from ._study import FULL, in_order, percent
 from ._style import styles
 
+UNTAKEN = re.compile(r"[^/\w.\- :]")  # in the name of a metric, by MLflow
 WHOLE = 1e-6  # of a percent: a share this near to a whole one is one
 
 
@@ -68,7 +70,8 @@ class About:
     def panel(self, backend: str, scene: str, metric: str = "psnr_db") -> str:
         """The metric that draws a panel of a figure, which has its name: only the summaries of one scene and backend
         have it. The paper's Figure 4 has those of `psnr_db`."""
-        return f"{metric}/{scene}" if backend == self.backends[0] else f"{metric}/{scene}/{backend}"
+        name = f"{metric}/{scene}" if backend == self.backends[0] else f"{metric}/{scene}/{backend}"
+        return UNTAKEN.sub("_", name)
 
     def panels(self) -> list[tuple[str, str]]:
         """(backend, scene) pairs in the order of the grid."""

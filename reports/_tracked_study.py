@@ -1,5 +1,6 @@
 """A study on its way into its experiment: what the experiment says of itself, its cells, their summaries, the page."""
 
+import contextlib
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -55,6 +56,15 @@ class Tracked:
         self.log.adopt(key, parent)
         return new
 
+    def drop(self, cell: Mapping[str, str]) -> None:
+        """Removes the run of a cell whose files are out of date, where it is the run of these files; and its summary,
+        where no other cell has one."""
+        with contextlib.suppress(UserError):  # what cannot be read has none
+            if self.log.drop(("cell", cell_name(cell)), self.cells.fingerprint(cell)):
+                key: Key = ("summary", key_of(group_of(cell)))
+                if not self._children(key):
+                    self.log.forget(key)
+
     def summary(self, group: Group, members: Sequence[Mapping[str, str]]) -> None:
         """Makes the points of a group's summary those of its `members`, cells that have runs."""
         key: Key = ("summary", key_of(group))
@@ -70,9 +80,8 @@ class Tracked:
             parent = self._parent(group, members[0])
         else:
             raise UserError(f"other writers removed the run of {key[1]} {TRIES} times")
-        for kind, name in [*self.log.runs]:
-            if kind == "cell" and name.startswith(f"{key[1]}/"):
-                self.log.adopt((kind, name), parent)
+        for child in self._children(key):
+            self.log.adopt(child, parent)
 
     def page(self, page: Path, also: Iterable[Path]) -> str:
         """Logs the page and what lies beside it; returns the id of the run."""
@@ -91,6 +100,10 @@ class Tracked:
         )
         self.log.put(key, lambda: told.fingerprint(sha256_file(page)), lambda: told)
         return self.log.runs[key][0].id
+
+    def _children(self, summary: Key) -> list[Key]:
+        """Keys of the cells that have a run and belong to a summary."""
+        return [key for key in self.log.runs if key[0] == "cell" and key[1].startswith(f"{summary[1]}/")]
 
     def _parent(self, group: Group, cell: Mapping[str, str]) -> str:
         """The id of the run of a group's summary, which is made where there is none."""

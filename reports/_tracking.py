@@ -47,16 +47,18 @@ def track(
     tracking: Tracking,
     progress: Progress = lambda done, total, text: None,
     say: Callable[[str], None] = lambda text: None,
+    stale: Sequence[Mapping[str, str]] = (),
 ) -> dict[str, int | str]:
     """Logs the cells of one study and their summaries; returns how many runs of cells were "logged" and "kept", and
     the id of the "experiment".
 
     `cells` are rows of the grid (KEY as texts), `results` is results/STUDY. Cells without all their files are left
-    out. Removes what crashes have left in the experiment. Waits up to `tracking.patience` seconds, each time anew, for
-    a store that does not answer. Raises UserError when some cells were not taken: repeat the call.
+    out, and the runs of those that are `stale` are removed, where they are runs of these files. Removes what crashes
+    have left in the experiment. Waits up to `tracking.patience` seconds, each time anew, for a store that does not
+    answer. Raises UserError when some cells were not taken: repeat the call.
     """
     ready = [cell for cell in cells if all((cell_folder(results, cell) / name).is_file() for name in RECORDS)]
-    return put(about, ready, StudyCells(about, results, tracking), tracking, progress, say)
+    return put(about, ready, StudyCells(about, results, tracking), tracking, progress, say, stale=stale)
 
 
 def put(
@@ -67,6 +69,7 @@ def put(
     progress: Progress = lambda done, total, text: None,
     say: Callable[[str], None] = lambda text: None,
     verdict: Sequence[str] = (),
+    stale: Sequence[Mapping[str, str]] = (),
 ) -> dict[str, int | str]:
     """What `track` does with the cells that are `ready`, wherever they come from."""
     patience = _Patience(tracking, say)
@@ -94,6 +97,8 @@ def put(
                 taken.append(cell)
                 done["logged" if new else "kept"] += 1
             progress(number + 1, len(ready), name)
+        for cell in stale:
+            offer(cell_name(cell), lambda: tracked.drop(cell))  # noqa: B023
         for group, members in by_group(taken).items():
             offer(key_of(group), lambda: tracked.summary(group, members))  # noqa: B023
     if refused:

@@ -22,8 +22,8 @@ from ._tracked_study import Tracked
 from ._tracked_summary import Group, by_group, group_of
 from ._tracking import explained, open_log
 
-LOOK_S = 4.0  # between two looks
-SETTLE_S = 8.0  # from when a score is seen to when it is logged, so that a study of seconds need not import MLflow
+LOOK_S = 3.0  # between two looks
+SETTLE_S = 6.0  # from when a score is seen to when it is logged, so that a study of seconds need not import MLflow
 AWAY_S = 30.0  # before a store that did not take a cell is asked again
 RETRIES, WAIT_S = 1, 5.0  # of one request, and for a database that another holds
 
@@ -46,6 +46,9 @@ class Follower:
         self.about, self.results, self.tracking, self.say, self.clock = about, results, tracking, say, clock
         self.source = StudyCells(about, results, tracking)
         self.cells = {cell_name(cell): cell for cell in cells}
+        score = [*RECORDS][-1]
+        self.scores = {name: str(cell_folder(results, cell) / score) for name, cell in self.cells.items()}
+        self.described: set[str] = set()  # scenes
         self.groups = by_group(cells)
         self.over = {name: stamp for name in stale if name in self.cells and (stamp := self._stamp(name))}
         self.seen: dict[str, tuple[Stamp, float]] = {}  # scores that are not logged, and since when they are there
@@ -77,9 +80,19 @@ class Follower:
 
     def log(self, names: Sequence[str], stopped: Callable[[], bool] = lambda: False) -> None:
         """Logs these cells, and the points of summaries that are complete now; raises nothing that goes wrong."""
+        folder = self.results / "logs" / "track"
+        with contextlib.ExitStack() as held:
+            try:  # nobody else logs this study meanwhile; what another does is not waited for
+                held.enter_context(holding.alone(folder, patience_s=0))
+            except (UserError, OSError):
+                self.tracked, self.again = None, self.clock() + AWAY_S
+                return
+            self._log(names, stopped)
+        self._account()
+
+    def _log(self, names: Sequence[str], stopped: Callable[[], bool]) -> None:
         try:
-            # Nobody else logs this study meanwhile; what another does is not waited for.
-            with holding.alone(self.results / "logs" / "track", patience_s=0), explained(self.tracking.uri):
+            with explained(self.tracking.uri):
                 tracked = self._open()
                 touched = {}
                 for name in names:
@@ -102,7 +115,6 @@ class Follower:
             if str(error) != self.said:
                 self.said = str(error)
                 self.say(f"{error}; trying again")
-        self._account()
 
     def _open(self) -> Tracked:
         if self.tracked is None:
@@ -141,13 +153,15 @@ class Follower:
 
     def _stamp(self, name: str) -> Stamp | None:
         """Of the cell's score; None where there is none, or nothing yet to describe its scene by."""
-        cell = self.cells[name]
         try:
-            if not (self.results / "scenes" / f"{cell['scene']}.json").is_file():
-                return None
-            found = (cell_folder(self.results, cell) / [*RECORDS][-1]).stat()
+            found = os.stat(self.scores[name])  # noqa: PTH116 - of all cells, every few seconds
         except OSError:
             return None
+        scene = self.cells[name]["scene"]
+        if scene not in self.described:
+            if not (self.results / "scenes" / f"{scene}.json").is_file():
+                return None
+            self.described.add(scene)
         return found.st_mtime_ns, found.st_size
 
     def _note_lag(self, stamp: Stamp) -> None:

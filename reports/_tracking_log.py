@@ -9,6 +9,7 @@ writer leaves is removed by whoever begins next.
 import contextlib
 import hashlib
 import json
+import shutil
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -221,9 +222,20 @@ class Log:
         self._delete(run for run in runs if run.writer == self.writer and not run.finished)
         return [run for run in runs if run.finished]
 
+    def drop(self, key: Key, fingerprint: str) -> bool:
+        """Removes the run of the key where it is the one of the fingerprint; whether it was."""
+        old = [run for run in self.runs.get(key, []) if run.fingerprint == fingerprint]
+        self._delete(old)
+        if old:
+            self.runs.pop(key)
+        return bool(old)
+
     def _delete(self, runs: Iterable[Run]) -> None:
+        """MLflow keeps what is deleted; its files are removed where they lie beside the results."""
         for run in list(runs):
             self.client.delete_run(run.id)
+            if not is_remote(self.uri) and run.id.isalnum():
+                shutil.rmtree(Path(self.tracking.artifacts).resolve() / self.study / run.id, ignore_errors=True)
 
 
 def _key(tags: Mapping[str, str]) -> Key | None:

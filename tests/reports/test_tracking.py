@@ -388,3 +388,51 @@ def test_cells_without_all_their_files_are_left_out(store):
     results, tracking = store
     results.joinpath("cells", *(ROWS[0][key] for key in _tracking.KEY), "metrics.json").unlink()
     assert track(results, tracking) == {"logged": 3, "kept": 0}
+
+
+def test_a_cell_that_is_out_of_date_loses_its_run_and_its_place_in_the_summary(store):
+    results, tracking = store
+    rows = [row for row in RATIOS if row["backend"] == "splat"]
+    for row in rows:
+        write_cell(results, row, psnr_of(row))
+    told = about(rows=rows)
+    track(results, tracking, rows, told)
+
+    def again(sound):
+        stale = [row for row in rows if row not in sound]
+        _tracking.track(told, sound, results, tracking, stale=stale)
+        client, summaries = runs_of(tracking, "summary")
+        names = {run.info.run_name: run for run in summaries}
+        return client, names, {run.data.tags[_tracking.CELL] for run in runs_of(tracking)[1]}
+
+    client, names, cells = again(rows[1:])
+    assert cells == {"/".join(row.values()) for row in rows[1:]}
+    assert history(client, names["maxmin · room"], "psnr_db") == [(5, 16.5), (10, 16.5), (20, 17.5)]
+    client, names, cells = again(rows[6:])
+    assert set(names) == {"full · room"}
+    assert len(cells) == 2
+    # a run that was made of other files, by another machine perhaps, stays
+    track(results, tracking, rows, told)
+    write_cell(results, rows[0], 12.0)
+    _, _, cells = again(rows[1:])
+    assert len(cells) == len(rows)
+
+
+def test_files_of_runs_that_are_replaced_go(store, tmp_path):
+    results, tracking = store
+    for psnr_db in (20.0, 21.0, 22.0):
+        write_cell(results, ROWS[0], psnr_db)
+        track(results, tracking, ROWS[:1])
+    (tmp_path / "artifacts" / "demo" / "of_the_user").mkdir()
+    _, runs = runs_of(tracking)
+    kept = {path.name for path in (tmp_path / "artifacts" / "demo").iterdir()}
+    assert kept == {runs[0].info.run_id, "of_the_user"}
+
+
+def test_names_that_mlflow_does_not_take_are_written_otherwise(store):
+    results, tracking = store
+    row = {**ROWS[0], "scene": "küche, [alt]"}
+    write_cell(results, row)
+    track(results, tracking, [row], about(rows=[row]))
+    client, (run,) = runs_of(tracking, "summary")
+    assert history(client, run, "psnr_db/küche_ _alt_") == [(10, 20.0)]

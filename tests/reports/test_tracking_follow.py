@@ -168,9 +168,11 @@ def test_another_that_logs_the_study_is_not_waited_for(study):
 
     results, tracking, clock = study
     write_cell(results, ROWS[0])
-    one = follower(study)
+    said = []
+    one = follower(study, say=said.append)
     with holding.alone(results / "logs" / "track"):
         looks(one, clock)
+    assert said == []
     clock.now += _tracking_follow.AWAY_S
     looks(one, clock)
     assert len(runs_of(tracking)[1]) == 1

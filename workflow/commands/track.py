@@ -1,5 +1,6 @@
 """Log a study to MLflow."""
 
+import contextlib
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -35,8 +36,8 @@ def command(
     from ...common import settings as settings_file
     from ...common.errors import UserError
     from ...common.files import write_json
-    from ...reports import _about, _tracked_link, _tracking
-    from .. import _collect, _study
+    from ...reports import _about, _tracking
+    from .. import _study
 
     settings = settings_file.load()
     asked = settings.tracking
@@ -51,16 +52,14 @@ def command(
     if follow:
         _follow(about, cells, folder, asked, of_run)
         return
-    done: dict[str, Any] = {"skipped": _tracking.NO_TRACKING}
     try:
+        done: dict[str, Any] = {"skipped": _tracking.NO_TRACKING}
         if asked.uri:
-            done = {}
-            if only != "page":
-                cells = _collect.without_stale(cells, folder)
-                done |= _alone(folder, asked, lambda: _tracking.track(about, cells, folder, asked, _progress(), _say))
-                done["figure"] = _tracked_link.address(asked.uri, str(done["experiment"]))
-            if only == "page" or (only is None and (folder / "reports" / "index.html").is_file()):
-                done |= _alone(folder, asked, lambda: _publish(about, folder, asked))
+            done = _given_up(folder) if only == "page" and stamp else {}
+        if not done and only != "page":
+            done |= _log(about, cells, folder, asked)
+        if "skipped" not in done and only != "cells" and (only or (folder / "reports" / "index.html").is_file()):
+            done |= _publish(about, folder, asked)
     except UserError as error:
         if stamp is None:
             raise
@@ -73,18 +72,40 @@ def command(
         _tell(done)
 
 
-def _alone(folder: Path, tracking: Any, what: Callable[[], dict]) -> dict[str, Any]:
-    """What `what` returns, called while nobody else on this machine logs the study."""
-    from ...common import holding
+def _log(about: Any, cells: list[dict[str, str]], folder: Path, tracking: Any) -> dict[str, Any]:
+    """The cells that are sound, and where they are to be seen."""
+    from ...reports import _tracked_link, _tracking
+    from .. import _collect
 
-    with holding.alone(folder / "logs" / "track", tracking.patience):
-        return what()
+    sound = _collect.without_stale(cells, folder)
+    stale = [cell for cell in cells if cell not in sound]
+    with _alone(folder, tracking):
+        done = _tracking.track(about, sound, folder, tracking, _progress(), _say, stale)
+    return {**done, "figure": _tracked_link.address(tracking.uri, str(done["experiment"]))}
 
 
 def _publish(about: Any, folder: Path, tracking: Any) -> dict[str, str]:
     from ...reports import _tracking_page
 
-    return _tracking_page.publish(about, folder, tracking)
+    with _alone(folder, tracking):
+        return _tracking_page.publish(about, folder, tracking)
+
+
+def _given_up(folder: Path) -> dict[str, Any]:
+    """Why the cells were not logged a moment ago: the page need not wait for the same."""
+    from ...common.files import read_json
+
+    stamps = [path for name in ("tracked", "tracked.partial") if (path := folder / f"{name}.json").is_file()]
+    newest = max(stamps, key=lambda path: path.stat().st_mtime_ns, default=None)
+    told = read_json(newest, "stamp of tracking") if newest else {}
+    return {"skipped": told["skipped"]} if isinstance(told, dict) and "skipped" in told else {}
+
+
+def _alone(folder: Path, tracking: Any) -> contextlib.AbstractContextManager[None]:
+    """While the body runs nobody else on this machine logs the study."""
+    from ...common import holding
+
+    return holding.alone(folder / "logs" / "track", tracking.patience)
 
 
 def _import(recording: Path, name: str | None, settings: Any) -> None:
