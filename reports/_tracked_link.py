@@ -11,6 +11,7 @@ from ._tracking_log import is_remote
 
 PORT = 5000
 HERE = f"http://127.0.0.1:{PORT}"
+STAMPS = ("tracked.json", "tracked.partial.json", "logs/track/follow.json")  # the last of a run that goes on
 
 
 def address(uri: str, experiment: str, here: str = HERE) -> str:
@@ -18,17 +19,24 @@ def address(uri: str, experiment: str, here: str = HERE) -> str:
     return _tracked_view.link(masked(uri).replace("***@", "") if is_remote(uri) else here, experiment)
 
 
+def store(uri: str) -> str:
+    """What stamps say of the store that an experiment is in; without a password."""
+    return masked(uri, uri)
+
+
 def figures(results: Path, uri: str, here: str = HERE) -> dict[str, str]:
-    """Addresses of Figure 4 of all studies in a folder of results that have been logged, by name."""
-    found = {folder.name: _experiment(folder) for folder in sorted(results.glob("*")) if folder.is_dir()}
+    """Addresses of Figure 4 of all studies in a folder of results that have been logged to `uri`, by name."""
+    found = {folder.name: _experiment(folder, uri) for folder in sorted(results.glob("*")) if folder.is_dir()}
     return {name: address(uri, experiment, here) for name, experiment in found.items() if experiment}
 
 
-def _experiment(results: Path) -> str:
-    """The id of a study's experiment, as the last that logged it has said."""
-    for name in ("tracked.json", "tracked.partial.json"):
+def _experiment(results: Path, uri: str) -> str:
+    """The id of a study's experiment, as the last that logged it to this store has said; empty where none has."""
+    stamps = [path for name in STAMPS if (path := results / name).is_file()]
+    for path in sorted(stamps, key=lambda path: path.stat().st_mtime_ns, reverse=True):
         with contextlib.suppress(UserError, AttributeError):
-            found = read_json(results / name).get("experiment") if (results / name).is_file() else None
-            if isinstance(found, str) and found.isdigit():
+            told = read_json(path)
+            found = told.get("experiment")
+            if isinstance(found, str) and found.isdigit() and told.get("store") == store(uri):
                 return found
     return ""

@@ -15,12 +15,12 @@ from ..common.cells import RECORDS, cell_folder, cell_name
 from ..common.errors import UserError
 from ..common.files import write_json
 from ..common.settings import Tracking
-from . import _tracking_errors
+from . import _tracked_link, _tracking_errors
 from ._about import About
 from ._tracked_cell import StudyCells
 from ._tracked_study import Tracked
 from ._tracked_summary import Group, by_group, group_of
-from ._tracking import explained, open_log
+from ._tracking import Progress, explained, open_log
 
 LOOK_S = 3.0  # between two looks
 SETTLE_S = 6.0  # from when a score is seen to when it is logged, so that a study of seconds need not import MLflow
@@ -41,9 +41,11 @@ class Follower:
         tracking: Tracking,
         stale: Collection[str] = (),
         say: Callable[[str], None] = lambda text: None,
+        progress: Progress = lambda done, total, text: None,
         clock: Callable[[], float] = time.monotonic,
     ):
-        self.about, self.results, self.tracking, self.say, self.clock = about, results, tracking, say, clock
+        self.about, self.results, self.tracking = about, results, tracking
+        self.say, self.progress, self.clock = say, progress, clock
         self.source = StudyCells(about, results, tracking)
         self.cells = {cell_name(cell): cell for cell in cells}
         score = [*RECORDS][-1]
@@ -54,6 +56,7 @@ class Follower:
         self.seen: dict[str, tuple[Stamp, float]] = {}  # scores that are not logged, and since when they are there
         self.logged: set[str] = set()
         self.tracked: Tracked | None = None
+        self.experiment = ""
         self.again = 0.0  # when a store that was away is asked again
         self.said = ""
         self.began, self.longest_s = time.time(), 0.0  # from a score of this time on to its run
@@ -89,6 +92,7 @@ class Follower:
                 return
             self._log(names, stopped)
         self._account()
+        self.progress(len(self.logged), len(self.cells), "")
 
     def _log(self, names: Sequence[str], stopped: Callable[[], bool]) -> None:
         try:
@@ -122,6 +126,7 @@ class Follower:
             log.start()
             self.tracked = Tracked(self.about, self.source, log)
             self.tracked.describe()
+            self.experiment = log.experiment
         return self.tracked
 
     def _cell(self, tracked: Tracked, name: str) -> bool:
@@ -175,6 +180,8 @@ class Follower:
             write_json(
                 self.results / "logs" / "track" / "follow.json",
                 {
+                    "experiment": self.experiment,
+                    "store": _tracked_link.store(self.tracking.uri),
                     "pid": os.getpid(),
                     "cells": len(self.logged),
                     "cpu_s": time.process_time(),

@@ -17,7 +17,7 @@ from tests.reports.test_tracking import ROWS, about, counts, describe, history, 
 from viewbench.common.cells import cell_folder, cell_name
 from viewbench.common.settings import Tracking
 from viewbench.common.settings import load as load_settings
-from viewbench.reports import _tracking, _tracking_follow
+from viewbench.reports import _tracked_link, _tracking, _tracking_follow
 from viewbench.reports._tracking_follow import LOOK_S, SETTLE_S, Follower
 from viewbench.workflow import _study
 
@@ -41,7 +41,7 @@ def study(tmp_path):
 
 def follower(study, stale=(), say=lambda text: None):
     results, tracking, clock = study
-    return Follower(about(), ROWS, results, tracking, stale, say, clock)
+    return Follower(about(), ROWS, results, tracking, stale, say, clock=clock)
 
 
 def looks(one, clock):
@@ -91,6 +91,9 @@ def test_what_it_logs_is_what_the_end_of_the_study_logs(study):
     assert {run.info.run_id for run in runs_of(tracking, "")[1]} == before
     told = json.loads((results / "logs" / "track" / "follow.json").read_text())
     assert told["cells"] == 4
+    # from which the dashboard knows where the figure is while the study runs
+    assert list(_tracked_link.figures(results.parent, tracking.uri)) == ["demo"]
+    assert _tracked_link.figures(results.parent, "sqlite:///another.db") == {}
 
 
 def test_a_cell_that_is_scored_again_is_logged_again(study):
@@ -187,10 +190,12 @@ backends: [{name: splat, backend: splat, budget: {iterations: 20}}]
 width: 48
 reference: false
 """
-# `viewbench`, which looks every moment.
+# `viewbench`, which looks every moment and gives way to nobody.
 HURRIED = """
 import sys
 from viewbench.reports import _tracking_follow
+from viewbench.workflow import _tracker
+_tracker.give_way = lambda: None
 _tracking_follow.LOOK_S, _tracking_follow.SETTLE_S, _tracking_follow.AWAY_S = 0.05, 0.0, 0.2
 from viewbench.__main__ import main
 sys.argv = ["viewbench", *sys.argv[1:]]

@@ -11,6 +11,7 @@ import pytest
 
 from tests.conftest import known, until
 from tests.reports.test_tracking import describe
+from viewbench.reports import _tracked_link
 from viewbench.workflow import _tracker
 
 STUDY = """scenes: [room_human]
@@ -111,13 +112,19 @@ def test_a_run_says_where_its_figure_is(tmp_path, capsys):
     for uri in ("", "sqlite:///a.db"):
         _tracker.say_where(str(results), uri)
     assert capsys.readouterr().err == ""
-    (results / "tracked.json").write_text(json.dumps({"logged": 1, "experiment": "7"}))
+    address = "https://ann:secret@example.org/mlflow/"
+
+    def logged_to(uri):
+        (results / "tracked.json").write_text(json.dumps({"experiment": "7", "store": _tracked_link.store(uri)}))
+
+    logged_to("sqlite:///a.db")
     _tracker.say_where(str(results), "sqlite:///a.db")
     assert "dashboard` runs): http://127.0.0.1:5000/#/experiments/7/runs?" in capsys.readouterr().err
-    _tracker.say_where(str(results), "https://ann:secret@example.org/mlflow/")
+    logged_to(address)
+    _tracker.say_where(str(results), address)
     said = capsys.readouterr().err
     assert "in MLflow: https://example.org/mlflow/#/experiments/7/runs?" in said
-    assert "secret" not in said
+    assert "secret" not in said + (results / "tracked.json").read_text()
 
 
 def test_the_dashboard_says_what_is_missing(run_viewbench, tmp_path):
@@ -152,6 +159,7 @@ def test_the_dashboard_serves_what_was_logged(tmp_path):
     write_cell(results, ROWS[0])
     uri = f"sqlite:///{tmp_path}/results/mlflow.db"
     done = _tracking.track(about(), ROWS[:1], results, Tracking(uri=uri, artifacts=str(tmp_path / "artifacts")))
+    done |= {"store": "sqlite:///results/mlflow.db"}
     (results / "tracked.json").write_text(json.dumps(done))
     port = free_port()
     with open(tmp_path / "said.txt", "wb") as said:

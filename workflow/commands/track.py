@@ -81,7 +81,8 @@ def _log(about: Any, cells: list[dict[str, str]], folder: Path, tracking: Any) -
     stale = [cell for cell in cells if cell not in sound]
     with _alone(folder, tracking):
         done = _tracking.track(about, sound, folder, tracking, _progress(), _say, stale)
-    return {**done, "figure": _tracked_link.address(tracking.uri, str(done["experiment"]))}
+    figure = _tracked_link.address(tracking.uri, str(done["experiment"]))
+    return {**done, "store": _tracked_link.store(tracking.uri), "figure": figure}
 
 
 def _publish(about: Any, folder: Path, tracking: Any) -> dict[str, str]:
@@ -125,7 +126,8 @@ def _follow(about: Any, cells: list[dict[str, str]], folder: Path, tracking: Any
     if not tracking.uri:
         raise UserError("tracking.uri is empty: there is nothing to log to")
     stale, stopped = _tracker.led() if of_run else ((), lambda wait_s: bool(time.sleep(wait_s)))
-    follower = _tracking_follow.Follower(about, cells, folder, tracking, stale, _say)
+    progress = (lambda done, total, text: None) if of_run else _progress()
+    follower = _tracking_follow.Follower(about, cells, folder, tracking, stale, _say, progress)
     _tracker.give_way()
     follower.go_on(stopped)
 
