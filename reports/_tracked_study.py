@@ -66,7 +66,6 @@ class Tracked:
             if self.log.add(key, points, ended_ms):
                 break
             # A number has changed, and the history of a metric keeps what it was; or another removed the run.
-            self.log.forget(key)
             parent = self._parent(group, members[0])
         else:
             raise UserError(f"other writers removed the run of {key[1]} {TRIES} times")

@@ -119,8 +119,8 @@ class Log:
         return next(iter(self.runs.get(key, [])), None)
 
     def add(self, key: Key, points: Mapping[str, Sequence[Number]], ended_ms: int) -> bool:
-        """Adds the points, by ratio, that the summary does not have; False, and nothing is added, where it has others
-        than these, or another writer has removed it.
+        """Adds the points, by ratio, that the summary does not have; False, and it is no longer known, where it has
+        others than these, with which it is removed, or where another writer has removed it.
 
         Repeating it does no harm: MLflow has each number of a metric, step and time once.
         """
@@ -128,7 +128,10 @@ class Log:
 
         run = self.runs[key][0]
         told = {ratio: _digest(numbers) for ratio, numbers in points.items()}
-        if any(told.get(ratio) != known for ratio, known in run.points.items()):
+        if _differ(run, told):
+            # Another may have made it anew since this process has learnt of it: that one is right.
+            self._delete(found for found in self._finished(key) if _differ(found, told))
+            del self.runs[key]
             return False
         missing = [ratio for ratio in told if ratio not in run.points]
         if missing:
@@ -138,14 +141,10 @@ class Log:
                 self.client.log_batch(run.id, metrics=[Metric(*number) for number in numbers], tags=[tag])
                 self.client.set_terminated(run.id, "FINISHED", end_time=ended_ms)
             if gone:
+                del self.runs[key]
                 return False
             self.runs[key] = [replace(run, points=told)]
         return True
-
-    def forget(self, key: Key) -> None:
-        """Removes the runs of the key."""
-        self._delete(self._finished(key))
-        self.runs.pop(key, None)
 
     def adopt(self, key: Key, parent: str) -> None:
         """Makes the run of the key a child of another."""
@@ -232,6 +231,11 @@ def _key(tags: Mapping[str, str]) -> Key | None:
         if tag in tags and tags.get(KIND, kind) == kind:
             return kind, tags[tag]
     return None
+
+
+def _differ(run: Run, told: Mapping[str, str]) -> bool:
+    """Whether the summary has a point that is none of these, by ratio."""
+    return any(told.get(ratio) != known for ratio, known in run.points.items())
 
 
 def _digest(numbers: Sequence[Number]) -> str:

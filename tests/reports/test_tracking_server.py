@@ -17,6 +17,9 @@ from viewbench.common.cells import cell_name
 from viewbench.common.errors import UserError
 from viewbench.common.settings import Tracking
 from viewbench.reports import _tracking
+from viewbench.reports._tracked_cell import StudyCells
+from viewbench.reports._tracked_study import Tracked
+from viewbench.reports._tracked_summary import group_of
 
 FILES = {"selection.json", "train.json", "metrics.json", "renders", "model"}
 
@@ -218,6 +221,44 @@ def test_a_cell_that_is_made_anew_while_it_is_logged_is_logged_anew(server, prox
     proxy.loses = changes
     log(name, [ROWS[0]], results, Tracking(uri=proxy.url))
     assert_right(server, name, ROWS[:1])
+
+
+@pytest.mark.parametrize("change", ["a score", "a summary that is removed"])
+def test_a_summary_that_another_has_made_anew_is_kept(server, proxy, study, change):
+    """Of two who know the same run, which goes, the second takes that of the first: eight would go on without end."""
+    name, results = study
+    tracking = Tracking(uri=proxy.url)
+    if change == "a score":
+        write_cell(results, ROWS[0], psnr_db=15.0)
+    log(name, ROWS[:2], results, tracking)
+    write_cell(results, ROWS[0])
+    rows = [*ROWS[:2], *({**row, "ratio": "0.2"} for row in ROWS[:2])]
+    for row in rows[2:]:
+        write_cell(results, row)
+    both = []
+    for _ in range(2):
+        own = _tracking.open_log(name, tracking, 1, 5)
+        own.start()
+        both.append(Tracked(about(name, rows), StudyCells(about(name, rows), results, tracking), own))
+    client, (old,) = runs_of(server, name)[0], [run for run in runs_of(server, name)[1] if is_summary(run)]
+    if change != "a score":
+        client.delete_run(old.info.run_id)
+    for one in both:
+        for row in rows:
+            one.cell(row)
+        one.summary(group_of(rows[0]), rows)
+    _, runs = runs_of(server, name)
+    (summary,) = [run for run in runs if is_summary(run)]
+    assert summary.info.run_id != old.info.run_id
+    assert {known(one.log.known(("summary", "splat/room/random"))).id for one in both} == {summary.info.run_id}
+    history = client.get_metric_history(summary.info.run_id, "psnr_db")
+    assert [(point.step, point.value) for point in history] == [(10, 20.0), (20, 20.0)]
+    cells = [run for run in runs if not is_summary(run)]
+    assert [run.data.tags["mlflow.parentRunId"] for run in cells] == 4 * [summary.info.run_id]
+
+
+def is_summary(run):
+    return run.data.tags["viewbench.kind"] == "summary"
 
 
 def test_an_experiment_that_was_deleted_is_restored_without_what_was_removed(server, proxy, study):
