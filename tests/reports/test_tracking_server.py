@@ -20,6 +20,7 @@ from viewbench.reports import _tracking
 from viewbench.reports._tracked_cell import StudyCells
 from viewbench.reports._tracked_study import Tracked
 from viewbench.reports._tracked_summary import group_of
+from viewbench.reports._tracking_log import Log
 
 FILES = {"selection.json", "train.json", "metrics.json", "renders", "model"}
 
@@ -190,6 +191,19 @@ def test_eight_writers_of_all_cells_at_once_in_an_experiment_that_is_not_there(s
         thread.join()
     assert failed == []
     assert_right(server, name)
+
+
+def test_who_logs_to_a_server_begins_somewhere_and_leaves_nothing_out(study):
+    rows = [{**row, "ratio": str(ratio)} for row in ROWS for ratio in (0.1, 0.2, 0.3)]
+
+    def turned(uri):
+        return _tracking._turned(rows, Log(None, uri, "demo", Tracking()))
+
+    assert turned("sqlite:///mlflow.db") == rows
+    orders = [turned("http://127.0.0.1:5000") for _ in range(40)]
+    assert all(sorted(map(cell_name, order)) == sorted(map(cell_name, rows)) for order in orders)
+    assert len({cell_name(order[0]) for order in orders}) > 1
+    assert _tracking._turned([], Log(None, "http://127.0.0.1:5000", "demo", Tracking())) == []
 
 
 def test_a_run_that_another_removes_is_begun_again(server, proxy, study):

@@ -24,8 +24,8 @@ from tests.server.postgres import Postgres, packages, programs
 from tests.server.trouble import Trouble, loses_some
 
 COMES_S, LAG_S = 3.0, 15.0  # seconds from one cell to the next, and within which it comes to all machines
-KILLED_S = 9.0  # from one kill of a process that follows to the next
-CATCH_UP_S = 60.0  # after the last cell, for the processes that follow
+KILLED_S = 15.0  # from one kill of a process that follows to the next
+CATCH_UP_S = 120.0  # after the last cell, for the processes that follow
 
 
 def main() -> None:
