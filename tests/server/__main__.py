@@ -24,8 +24,7 @@ from tests.server.postgres import Postgres, packages, programs
 from tests.server.trouble import Trouble, loses_some
 
 COMES_S, LAG_S = 3.0, 15.0  # seconds from one cell to the next, and within which it comes to all machines
-KILLED_S = 15.0  # from one kill of a process that follows to the next
-CATCH_UP_S = 120.0  # after the last cell, for the processes that follow
+CATCH_UP_S = 240.0  # after the last cell, for the processes that follow
 
 
 def main() -> None:
@@ -78,38 +77,40 @@ def followed(study: Study, server: Server, postgres: Postgres, proxy: Proxy, wri
     made, chance = study.make_cells(), random.Random(0)
     machines = [Machine(study, number, made) for number in range(writers)]
     harm(proxy)
-    killed = 0
+
+    def killed() -> None:
+        machine = chance.choice(machines)
+        machine.kill()
+        machine.follow()
+
     cells = chance.sample(study.cells, len(study.cells))
     comes = [
         (COMES_S * number + chance.uniform(0, LAG_S), machine, cell)
         for number, cell in enumerate(cells)
         for machine in range(writers)
     ]
-    with Trouble(server, postgres, proxy) as trouble:
-        for machine in machines:
-            machine.follow()
+    for machine in machines:
+        machine.follow()
+    with Trouble(server, postgres, proxy, killed) as trouble:
         began = time.monotonic()
         try:
             for at, number, cell in sorted(comes, key=lambda one: one[0]):
                 while time.monotonic() < began + at:
                     time.sleep(0.05)
                 machines[number].take(cell)
-                if at > (killed + 1) * KILLED_S:
-                    machine = chance.choice(machines)
-                    machine.kill()
-                    machine.follow()
-                    killed += 1
             end = time.monotonic() + CATCH_UP_S
             while time.monotonic() < end and any(one.account()["cells"] < len(cells) for one in machines):
                 time.sleep(1)
+            trouble.spare()
             counts = sorted(int(one.account()["cells"]) for one in machines)
             ends_s = max(machine.end() for machine in machines)
         except BaseException:
+            trouble.spare()
             for machine in machines:
                 machine.kill()
             raise
         asked = trouble.asked()
-        print(f"followed by {writers} machines: {killed} of these processes killed, {dict(trouble.done)}")
+        print(f"followed by {writers} machines: {dict(trouble.done)}")
         print(f"  cells that each had seen logged: {counts} of {len(cells)}; the longest to end took {ends_s:.0f} s")
         print(f"  {asked} requests, {asked / len(cells):.0f} a cell", flush=True)
         print(f"  track by {writers} at once: {all_at_once(machines)}; {dict(trouble.done)} in all", flush=True)
