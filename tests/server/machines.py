@@ -45,7 +45,7 @@ class Study:
 
     def __init__(self, folder: Path, name: str, address: str, cells: int):
         self.name, self.folder, self.file = name, folder, folder / f"{name}.yaml"
-        ratios = ", ".join(f"{0.02 + 0.01 * i:.2f}" for i in range(max(1, cells // 6)))
+        ratios = ", ".join(f"{0.02 + 0.01 * i:.2f}" for i in range(max(1, cells // 8)))
         self.file.write_text(STUDY.format(ratios=ratios), encoding="utf-8")
         self.cells = _study.load(str(self.file), load_settings()).cells()
         self.environment = {
