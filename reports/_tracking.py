@@ -69,10 +69,10 @@ def put(
     verdict: Sequence[str] = (),
 ) -> dict[str, int | str]:
     """What `track` does with the cells that are `ready`, wherever they come from."""
-    patience = _Patience(tracking, say)
     done, refused = {"logged": 0, "kept": 0}, []
     with explained(tracking.uri):
         log = open_log(about.name, tracking, RETRIES, tracking.patience)
+        patience = _Patience(tracking, say)
         patience.ask(log.start)
         tracked = Tracked(about, source, log)
         patience.ask(lambda: tracked.describe(verdict))

@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 import uuid
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
@@ -350,7 +351,7 @@ USERS = {"": "Bearer tok/en-4711", "ann:pass%23word@": "Basic YW5uOnBhc3Mjd29yZA
 def test_no_password_is_told(server, proxy, study, user, header, monkeypatch, capfd, caplog):
     name, results = study
     monkeypatch.setenv("MLFLOW_TRACKING_TOKEN", "tok/en-4711")
-    tracking = Tracking(uri=proxy.url.replace("//", f"//{user}"), patience=1)
+    tracking = Tracking(uri=proxy.url.replace("//", f"//{user}"), patience=0)
     log(name, ROWS[:1], results, tracking)
     assert {sent["Authorization"] for sent in proxy.headers} == {header}
     said = []
@@ -358,7 +359,7 @@ def test_no_password_is_told(server, proxy, study, user, header, monkeypatch, ca
     with pytest.raises(UserError) as first:
         log(name, [ROWS[1]], results, tracking)
     with pytest.raises(UserError) as second:
-        log(name, ROWS, results, tracking, say=said.append)
+        log(name, ROWS, results, replace(tracking, patience=5), say=said.append)
     nobody = Tracking(uri=f"http://{user}127.0.0.1:9", patience=0)
     with pytest.raises(UserError) as third:
         log(name, ROWS, results, nobody)
