@@ -2,6 +2,7 @@
 PYTHON ?= python3
 STUDY ?= quick
 JOBS ?= 2
+PORT ?= 5000
 VENV := .venv
 BIN := $(VENV)/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
@@ -15,7 +16,7 @@ THREADS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 NUMBA_NUM_
 
 help:
 	@echo "make reports     the study STUDY=quick: choose, train, score, report (results/STUDY/reports/index.html)"
-	@echo "make dashboard   MLflow over the runs just made, on http://127.0.0.1:5000"
+	@echo "make dashboard   MLflow over the runs just made, on http://127.0.0.1:5000 (PORT=)"
 	@echo "make screenshots what people see in MLflow of the runs just made: pictures in build/screenshots (needs Chromium)"
 	@echo "make test        linters, type checks and tests"
 	@echo "make soak        a study that is killed 60 times at random moments (half an hour; SOAK='--kills N --seed S')"
@@ -58,10 +59,9 @@ dev: $(VENV)/.installed-dev
 reports: setup
 	@$(THREADS) $(BIN)/snakemake -j$(JOBS) --config study=$(STUDY) -- reports
 	@echo "Open results/$(notdir $(basename $(STUDY)))/reports/index.html"
-	@$(BIN)/viewbench dashboard $(STUDY) --links 2> /dev/null || true
 
 dashboard: setup
-	@$(BIN)/viewbench dashboard
+	@$(BIN)/viewbench dashboard --port $(PORT)
 
 # STORE= may also be the address of a server that runs; SHOTS='--readme reports/mlflow.png' makes the README's picture.
 STORE ?= results/mlflow.db

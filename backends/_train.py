@@ -55,10 +55,10 @@ def train(
     scene, a folder that another process is writing, and whatever the backend refuses; PassingError
     where memory was short.
     """
-    began = now()
     threads.allow(settings.compute.threads)
     backend = _registry.load(job.backend, settings)
     lease = _registry.hold_gpu(backend, settings)
+    began = now()  # when it need not wait for a GPU any more
     reason = backend.available()
     if reason:
         raise UserError(f"backend '{job.backend}' is not available: {reason}")

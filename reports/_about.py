@@ -81,16 +81,16 @@ class About:
 def of_study(
     record: Mapping[str, Any],
     grid: Iterable[Mapping[str, str]],
-    file: str,
+    called: str,
     place: Callable[[str], str] = lambda scene: scene,
 ) -> About:
-    """Of a study whose file is called `file` and reads `record` when its defaults are filled in; `place` says where a
-    scene lies."""
+    """Of a study that `viewbench run CALLED` runs, and whose file reads `record` when its defaults are filled in;
+    `place` says where a scene lies."""
     return About(
         name=record["name"],
         title=record["title"],
         description=record["description"],
-        source=f"viewbench run {file}",
+        source=f"viewbench run {called}",
         selectors=tuple(entry["name"] for entry in record["selectors"]),
         grid=tuple(grid),
         places={scene: place(scene) for scene in record["scenes"]},

@@ -264,6 +264,8 @@ def missing_words(study: Study) -> str:
 
 
 def _cell(row: dict[str, str], folder: Path) -> Cell:
+    if not 0 < float(row["ratio"]) <= 1:
+        raise ValueError(f"a ratio of {row['ratio'][:40]}")
     return Cell(
         scene=row["scene"],
         backend=row["backend"],

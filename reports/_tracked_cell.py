@@ -22,6 +22,7 @@ from ._about import About
 from ._tracked_run import COLOUR, COMMIT, DIRTY, LONGEST_DIGEST, SOURCE, SOURCE_TYPE, USER, Content, DataSet, params
 
 MB = 10**6
+LATEST_S = 2.0**37  # of a time, since 1970: databases take its milliseconds
 VERSION = 2  # of how a cell is logged: another one replaces the runs that are there
 
 
@@ -61,6 +62,10 @@ class Cells(Protocol):
         """The description of a scene; empty where there is none."""
         ...
 
+    def made(self, cell: Mapping[str, str], fingerprint: str) -> bool:
+        """Whether a run with this fingerprint was logged from here, as far as can be told."""
+        ...
+
 
 class StudyCells:
     """The cells of results/STUDY."""
@@ -85,6 +90,8 @@ class StudyCells:
         digest, folder = hashlib.sha256(), cell_folder(self.results, cell)
         try:
             for file in RECORDS:
+                if (folder / file).is_symlink():  # which is none of viewbench's, and is not followed to be logged
+                    raise UserError(f"cell {cell_name(cell)}: '{folder / file}' is a link; put the file there")
                 digest.update((folder / file).read_bytes() + b"\0")
         except OSError as error:
             raise UserError(f"cell {cell_name(cell)} cannot be read: {error.strerror}: {error.filename}") from None
@@ -105,6 +112,17 @@ class StudyCells:
                 files=[(folder / file, None) for file in RECORDS] + self._pictures(cell, selection, metrics, drawn),
                 linked=_model(folder, train, self.tracking.models),
             )
+
+    def made(self, cell: Mapping[str, str], fingerprint: str) -> bool:
+        """Where the cell has no score any more, but other records, it was here that it was scored."""
+        folder = cell_folder(self.results, cell)
+        there = [(folder / file).is_file() for file in RECORDS]
+        if not all(there):
+            return any(there)
+        try:
+            return self.fingerprint(cell) == fingerprint
+        except UserError:
+            return True
 
     def scene(self, name: str) -> dict[str, Any]:
         """As `viewbench describe` wrote it; read again when that has written another one."""
@@ -176,7 +194,7 @@ def content(
         kind="cell",
         key=cell_name(cell),
         name=about.cell_title(cell),
-        tags={"backend": cell["backend"], **facts.tags, **common_tags(about, cell["selector"], facts.commit)},
+        tags={**facts.tags, **common_tags(about, cell["selector"], facts.commit)},
         params=params({**cell, "count": facts.count, "n_views": facts.n_views, **facts.named}),
         metrics=[(key, value, facts.ended_ms, 0) for key, value in final.items()] + curve,
         started_ms=facts.began_ms,
@@ -247,6 +265,8 @@ def _facts(
     trained = _time(train.get("began")) or (folder / "train.json").stat().st_mtime - float(train["seconds"])
     ended = _time(metrics.get("ended")) or (folder / "metrics.json").stat().st_mtime
     began = trained - float(sum(selection["seconds"].values()))
+    if not all(0 <= at < LATEST_S for at in (began, trained, ended)):
+        raise ValueError(f"times of {began:g} to {ended:g} s")
     began_ms, trained_ms, ended_ms = (round(1000 * at) for at in (began, trained, ended))
     return Facts(
         cell=cell,
@@ -255,6 +275,7 @@ def _facts(
         n_views=selection["n_views"],
         named=named,
         tags={
+            "backend": str(train.get("backend", cell["backend"])),
             "backend_version": str(train["version"]),
             "device": str(train["device"]),
             "machine": _machine(train.get("machine")),
@@ -306,10 +327,13 @@ def _curve(points: list[dict[str, Any]], began_ms: int) -> list[tuple[str, float
     """By step, and by when the trainer was there."""
     curve = []
     for point in points:
-        stamp = began_ms + round(1000 * (point["seconds"] or 0))
+        seconds, step = point["seconds"] or 0.0, point["step"]
+        if not (is_number(seconds) and is_number(step) and 0 <= seconds < LATEST_S and 0 <= step < LATEST_S):
+            continue
+        stamp = began_ms + round(1000 * seconds)
         for key, metric in (("loss", "train/loss"), ("test_psnr_db", "train/test_psnr_db")):
             if is_number(point.get(key)):
-                curve.append((metric, point[key], stamp, int(point["step"])))
+                curve.append((metric, point[key], stamp, int(step)))
     return curve
 
 

@@ -11,7 +11,8 @@ from typing import Any
 KIND = "viewbench.kind"  # one of the three below
 CELL, SUMMARY, REPORT = "viewbench.cell", "viewbench.summary", "viewbench.report"  # tags with a name, by kind
 KINDS = {"cell": CELL, "summary": SUMMARY, "report": REPORT}
-FINGERPRINT, WRITER, POINTS = "viewbench.fingerprint", "viewbench.writer", "viewbench.points"
+FINGERPRINT, WRITER, BEGUN = "viewbench.fingerprint", "viewbench.writer", "viewbench.begun"
+POINT = "viewbench.point."  # and a ratio: what tells the point of a summary from another one
 # MLflow's own tags (mlflow/utils/mlflow_tags.py, and constants.ts of its page for the colour).
 PARENT, COLOUR, USER = "mlflow.parentRunId", "mlflow.runColor", "mlflow.user"
 SOURCE, SOURCE_TYPE, COMMIT, DIRTY = (
@@ -75,6 +76,7 @@ def write(client: Any, experiment: str, told: Content, tags: dict[str, str], mad
     it, one for up to 1000 numbers, one for its data set, one a file, one to end it.
     """
     from mlflow.entities import Metric, Param
+    from mlflow.exceptions import MlflowException
     from mlflow.store.artifact.artifact_repository_registry import get_artifact_repository
 
     own = {KIND: told.kind, KINDS[told.kind]: told.key, **told.tags, **told.also}
@@ -89,7 +91,11 @@ def write(client: Any, experiment: str, told: Content, tags: dict[str, str], mad
             params=[Param(key, value) for key, value in told.params.items()],
         )
     if told.data:
-        client.log_inputs(run.run_id, datasets=[_input(told.data, told.of_data)])
+        datasets = [_input(told.data, told.of_data)]
+        try:
+            client.log_inputs(run.run_id, datasets=datasets)
+        except MlflowException:  # of two who bring one that is not there only one succeeds
+            client.log_inputs(run.run_id, datasets=datasets)
     # What client.log_artifact does, without asking for the run again to learn where its artifacts go.
     store = get_artifact_repository(run.artifact_uri, tracking_uri=client.tracking_uri)
     for path, where in told.files:

@@ -1,6 +1,5 @@
 """A study on its way into its experiment: what the experiment says of itself, its cells, their summaries, the page."""
 
-import contextlib
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -16,6 +15,7 @@ from ._tracked_summary import PANELS, Group, group_of, key_of
 from ._tracking_log import TRIES, Key, Log
 
 NOTE = "mlflow.note.content"
+ML = "workflowType=machine_learning"  # or a new browser shows the page of an app for language models
 KIND_OF_EXPERIMENT = "custom_model_development"  # in MLflow's words; without it the page is one for language models
 
 
@@ -57,27 +57,31 @@ class Tracked:
         return new
 
     def drop(self, cell: Mapping[str, str]) -> None:
-        """Removes the run of a cell whose files are out of date, where it is the run of these files; and its summary,
-        where no other cell has one."""
-        with contextlib.suppress(UserError):  # what cannot be read has none
-            if self.log.drop(("cell", cell_name(cell)), self.cells.fingerprint(cell)):
-                key: Key = ("summary", key_of(group_of(cell)))
-                if not self._children(key):
-                    self.log.forget(key)
+        """Removes the run of a cell whose files are out of date, where it is a run of these results."""
+        key: Key = ("cell", cell_name(cell))
+        if self.log.known(key) and self.cells.made(cell, self.log.runs[key][0].fingerprint):
+            self.log.remove(key)
 
-    def summary(self, group: Group, members: Sequence[Mapping[str, str]]) -> None:
-        """Makes the points of a group's summary those of its `members`, cells that have runs."""
+    def prune(self) -> None:
+        """Removes the runs of cells and summaries that the study does not have, and summaries without a cell."""
+        cells = {cell_name(cell) for cell in self.about.grid}
+        for key in [key for key in self.log.runs if key[0] == "cell" and key[1] not in cells]:
+            self.log.remove(key)
+        for key in [key for key in self.log.runs if key[0] == "summary" and not self._children(key)]:
+            self.log.remove(key)
+
+    def summary(self, group: Group, members: Sequence[Mapping[str, str]], whole: bool = True) -> None:
+        """Makes the points of a group's summary those of its `members`, cells that have runs; without `whole` it may
+        have more."""
         key: Key = ("summary", key_of(group))
         facts = [self.cells.facts(cell) for cell in members]
         points = _tracked_summary.points(group, self.about, facts)
         ended_ms = max(cell.ended_ms for cell in facts)
-        parent = self._parent(group, members[0])
         for _ in range(TRIES):
-            if self.log.add(key, points, ended_ms):
-                break
-            # A number has changed, and the history of a metric keeps what it was; or another removed the run.
-            self.log.forget(key)
             parent = self._parent(group, members[0])
+            # A number that has changed has the run made anew: the history of a metric keeps what it was.
+            if self.log.add(key, points, ended_ms, whole):
+                break
         else:
             raise UserError(f"other writers removed the run of {key[1]} {TRIES} times")
         for child in self._children(key):
@@ -108,8 +112,8 @@ class Tracked:
     def _parent(self, group: Group, cell: Mapping[str, str]) -> str:
         """The id of the run of a group's summary, which is made where there is none."""
         key: Key = ("summary", key_of(group))
-        asked, known = _tracked_summary.fingerprint(group, self.about), self.log.known(key)
-        if known is None or known.fingerprint != asked:
+        asked = _tracked_summary.fingerprint(group, self.about)
+        if [run.fingerprint for run in self.log.runs.get(key, [])] != [asked]:
             told = _tracked_summary.content(group, self.about, self.cells.facts(cell), self.cells.scene(group[1]))
             self.log.put(key, lambda: asked, lambda: told)
         return self.log.runs[key][0].id
@@ -121,6 +125,6 @@ def note(about: About, experiment: str, verdict: Sequence[str] = (), page: str =
     MLflow shows the first line alone until one asks for the rest. `page` is the id of the run that has the page.
     """
     links = [f"[Figure 4]({_tracked_view.link('', experiment)})"]
-    links += [f"[the page](#/experiments/{experiment}/runs/{page}/artifacts/index.html)"] if page else []
+    links += [f"[the page](#/experiments/{experiment}/runs/{page}/artifacts/index.html?{ML})"] if page else []
     parts = [" · ".join([about.title, *links]), " ".join(verdict), about.description]
     return "\n\n".join(part for part in parts if part)

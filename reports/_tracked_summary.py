@@ -51,7 +51,7 @@ def content(group: Group, about: About, first: Facts, scene: dict[str, Any]) -> 
         kind="summary",
         key=key_of(group),
         name=about.summary_title(*group),
-        tags={"backend": backend, **first.tags, **common_tags(about, selector, first.commit)},
+        tags={**first.tags, **common_tags(about, selector, first.commit)},
         params=params({"backend": backend, "scene": name, "selector": selector, **first.named}),
         metrics=(),
         started_ms=first.began_ms,

@@ -19,6 +19,7 @@ from ..common.cells import AXES, RECORDS, cell_folder, cell_name
 from ..common.errors import UserError
 from ..common.settings import Tracking
 from . import _tracking_errors, _tracking_sqlite
+from . import _tracking_turn as turns
 from ._about import About
 from ._tracked_cell import Cells, StudyCells
 from ._tracked_run import CELL, FINGERPRINT
@@ -53,12 +54,14 @@ def track(
     the id of the "experiment".
 
     `cells` are rows of the grid (KEY as texts), `results` is results/STUDY. Cells without all their files are left
-    out, and the runs of those that are `stale` are removed, where they are runs of these files. Removes what crashes
-    have left in the experiment. Waits up to `tracking.patience` seconds, each time anew, for a store that does not
-    answer. Raises UserError when some cells were not taken: repeat the call.
+    out; the runs of those that are `stale` go, where they are runs of these results, and those of cells and summaries
+    that the study does not have. Removes what crashes have left in the experiment. Waits up to `tracking.patience`
+    seconds, each time anew, for a store that does not answer. Raises UserError when some cells were not taken: repeat
+    the call.
     """
     ready = [cell for cell in cells if all((cell_folder(results, cell) / name).is_file() for name in RECORDS)]
-    return put(about, ready, StudyCells(about, results, tracking), tracking, progress, say, stale=stale)
+    source = StudyCells(about, results, tracking)
+    return put(about, ready, source, tracking, progress, say, stale=stale, place=turns.place(results))
 
 
 def put(
@@ -69,13 +72,15 @@ def put(
     progress: Progress = lambda done, total, text: None,
     say: Callable[[str], None] = lambda text: None,
     verdict: Sequence[str] = (),
-    stale: Sequence[Mapping[str, str]] = (),
+    stale: Sequence[Mapping[str, str]] | None = None,
+    place: str = "",
 ) -> dict[str, int | str]:
-    """What `track` does with the cells that are `ready`, wherever they come from."""
-    patience = _Patience(tracking, say)
+    """What `track` does with the cells that are `ready`, wherever they come from; what else is in the experiment is
+    left alone where `stale` is None."""
     done, refused = {"logged": 0, "kept": 0}, []
     with explained(tracking.uri):
-        log = open_log(about.name, tracking, RETRIES, tracking.patience)
+        log = open_log(about.name, tracking, RETRIES, tracking.patience, place)
+        patience = _Patience(tracking, say)
         patience.ask(log.start)
         tracked = Tracked(about, source, log)
         patience.ask(lambda: tracked.describe(verdict))
@@ -89,24 +94,44 @@ def put(
                 refused.append(f"{name}: {_tracking_errors.words(error, tracking.uri)}")
                 return None
 
-        taken = []
-        for number, cell in enumerate(ready):
+        taken = set[str]()
+        for number, cell in enumerate(_turned(_by_time(ready, source), log)):
             name = cell_name(cell)
             new = offer(name, lambda: tracked.cell(cell))  # noqa: B023
             if new is not None:
-                taken.append(cell)
+                taken.add(name)
                 done["logged" if new else "kept"] += 1
             progress(number + 1, len(ready), name)
-        for cell in stale:
-            offer(cell_name(cell), lambda: tracked.drop(cell))  # noqa: B023
-        for group, members in by_group(taken).items():
+        for group, members in by_group(cell for cell in ready if cell_name(cell) in taken).items():
             offer(key_of(group), lambda: tracked.summary(group, members))  # noqa: B023
+        for cell in stale or ():
+            offer(cell_name(cell), lambda: tracked.drop(cell))  # noqa: B023
+        if stale is not None:
+            patience.ask(tracked.prune)
     if refused:
         raise UserError(
             f"MLflow at '{masked(tracking.uri)}' took {sum(done.values())} of {len(ready)} cells, first without "
             f"{refused[0]}"
         )
     return {**done, "experiment": log.experiment}
+
+
+def _by_time(cells: Sequence[Mapping[str, str]], source: Cells) -> list[Mapping[str, str]]:
+    """In the order in which they were made: a summary begins with the first of its cells."""
+
+    def began(cell: Mapping[str, str]) -> float:
+        try:
+            return source.facts(cell).began_ms
+        except UserError:  # said when it is its turn
+            return float("inf")
+
+    return sorted(cells, key=began)
+
+
+def _turned(cells: Sequence[Mapping[str, str]], log: Log) -> list[Mapping[str, str]]:
+    """From another cell on in each process: several that log the same at once share the work."""
+    first = int(log.writer.rpartition("-")[2], 16) % len(cells) if log.shared and cells else 0
+    return [*cells[first:], *cells[:first]]
 
 
 def local_uri(uri: str) -> str:
@@ -118,7 +143,7 @@ def local_uri(uri: str) -> str:
     return f"{_tracking_sqlite.PREFIX}{path}"
 
 
-def open_log(study: str, tracking: Tracking, retries: int, wait_s: float) -> Log:
+def open_log(study: str, tracking: Tracking, retries: int, wait_s: float, place: str = "") -> Log:
     """The log of a study, without a request; waits so long for a file that is locked."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("DO_NOT_TRACK", "true")
@@ -138,7 +163,7 @@ def open_log(study: str, tracking: Tracking, retries: int, wait_s: float) -> Log
         client = MlflowClient(tracking_uri=uri)
         if path:
             client.search_experiments(max_results=1)  # makes the database, if the client has not
-    return Log(client, uri, study, tracking)
+    return Log(client, uri, study, tracking, place)
 
 
 @contextlib.contextmanager

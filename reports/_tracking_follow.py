@@ -7,15 +7,16 @@ store does not answer or is locked: the end of the study takes up what is missin
 import contextlib
 import os
 import time
+import uuid
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
-from ..common import holding
 from ..common.cells import RECORDS, cell_folder, cell_name
 from ..common.errors import UserError
 from ..common.files import write_json
 from ..common.settings import Tracking
 from . import _tracked_link, _tracking_errors
+from . import _tracking_turn as turns
 from ._about import About
 from ._tracked_cell import StudyCells
 from ._tracked_study import Tracked
@@ -24,6 +25,7 @@ from ._tracking import Progress, explained, open_log
 
 LOOK_S = 3.0  # between two looks
 SETTLE_S = 6.0  # from when a score is seen to when it is logged, so that a study of seconds need not import MLflow
+AT_ONCE = 20  # cells, before another that wants to log the study may
 AWAY_S = 30.0  # before a store that did not take a cell is asked again
 RETRIES, WAIT_S = 1, 5.0  # of one request, and for a database that another holds
 
@@ -46,7 +48,7 @@ class Follower:
     ):
         self.about, self.results, self.tracking = about, results, tracking
         self.say, self.progress, self.clock = say, progress, clock
-        self.source = StudyCells(about, results, tracking)
+        self.source, self.me = StudyCells(about, results, tracking), uuid.uuid4().hex
         self.cells = {cell_name(cell): cell for cell in cells}
         score = [*RECORDS][-1]
         self.scores = {name: str(cell_folder(results, cell) / score) for name, cell in self.cells.items()}
@@ -66,7 +68,7 @@ class Follower:
         while not stopped(LOOK_S):
             due = self.due()
             if due and self.clock() >= self.again:
-                self.log(due, lambda: stopped(0))
+                self.log(due[:AT_ONCE], lambda: stopped(0))
 
     def due(self) -> list[str]:
         """Names of the cells to log now."""
@@ -83,13 +85,15 @@ class Follower:
 
     def log(self, names: Sequence[str], stopped: Callable[[], bool] = lambda: False) -> None:
         """Logs these cells, and the points of summaries that are complete now; raises nothing that goes wrong."""
-        folder = self.results / "logs" / "track"
+        asked = self.tracking.uri, self.about.name, self.results, self.me, 0.0
         with contextlib.ExitStack() as held:
-            try:  # nobody else logs this study meanwhile; what another does is not waited for
-                held.enter_context(holding.alone(folder, patience_s=0))
+            try:  # what another does is not waited for
+                mine = held.enter_context(turns.turn(*asked))
             except (UserError, OSError):
-                self.tracked, self.again = None, self.clock() + AWAY_S
+                self.again = self.clock() + AWAY_S
                 return
+            if not mine:
+                self.tracked = None  # which knows less than what is there by now
             self._log(names, stopped)
         self._account()
         self.progress(len(self.logged), len(self.cells), "")
@@ -114,7 +118,7 @@ class Follower:
                     self._summary(tracked, group)
                 self.said = ""
         except UserError as error:
-            self.tracked = None  # which may know less than what is there
+            self.tracked = None
             self.again = self.clock() + AWAY_S
             if str(error) != self.said:
                 self.said = str(error)
@@ -122,7 +126,7 @@ class Follower:
 
     def _open(self) -> Tracked:
         if self.tracked is None:
-            log = open_log(self.about.name, self.tracking, RETRIES, WAIT_S)
+            log = open_log(self.about.name, self.tracking, RETRIES, WAIT_S, turns.place(self.results))
             log.start()
             self.tracked = Tracked(self.about, self.source, log)
             self.tracked.describe()
@@ -148,9 +152,9 @@ class Follower:
         ratios: dict[str, list[Mapping[str, str]]] = {}
         for cell in self.groups[group]:
             ratios.setdefault(cell["ratio"], []).append(cell)
-        whole = [cell for here in ratios.values() if all(map(self._is_logged, here)) for cell in here]
-        if whole:
-            tracked.summary(group, whole)
+        members = [cell for here in ratios.values() if all(map(self._is_logged, here)) for cell in here]
+        if members:
+            tracked.summary(group, members, whole=False)
 
     def _is_logged(self, cell: Mapping[str, str]) -> bool:
         name = cell_name(cell)

@@ -8,8 +8,8 @@ writer leaves is removed by whoever begins next.
 
 import contextlib
 import hashlib
-import json
 import shutil
+import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,9 +19,10 @@ from typing import Any
 from ..common.errors import UserError
 from ..common.settings import Tracking
 from . import _tracked_run, _tracking_errors
-from ._tracked_run import FINGERPRINT, KIND, KINDS, PARENT, POINTS, WRITER, Content, Number
+from ._tracked_run import BEGUN, FINGERPRINT, KIND, KINDS, PARENT, POINT, WRITER, Content, Number
 from ._tracking_errors import Kind
 
+DEAD_S = 600.0  # after which a run that nobody has ended was left by a writer that is dead, wherever it was
 TRIES = 10  # of a run that others took for one that a crash had left
 
 Key = tuple[str, str]  # kind, and what is unique among its runs
@@ -41,8 +42,14 @@ class Run:
     fingerprint: str
     writer: str
     started: int  # milliseconds since 1970
+    begun_s: float = 0.0  # since 1970, by the clock of its writer
     parent: str = ""
     points: Mapping[str, str] = field(default_factory=dict)  # of a summary: digests by ratio
+
+    def differs(self, told: Mapping[str, str], whole: bool) -> bool:
+        """Whether a summary has other points than these; without `whole` only those of the same ratios count."""
+        known = self.points.items()
+        return any(told.get(ratio) != point for ratio, point in known if whole or ratio in told)
 
 
 class _GoneError(Exception):
@@ -52,11 +59,11 @@ class _GoneError(Exception):
 class Log:
     """The experiment of one study. What MLflow raises passes through (`_tracking_errors.errors`)."""
 
-    def __init__(self, client: Any, uri: str, study: str, tracking: Tracking):
+    def __init__(self, client: Any, uri: str, study: str, tracking: Tracking, place: str = ""):
         self.client, self.uri, self.study, self.tracking = client, uri, study, tracking
         # A file of this machine has one writer at a time (`holding.alone`), and loses no answers.
         self.shared = is_remote(uri) or not uri.startswith("sqlite:")
-        self.experiment, self.writer = "", uuid.uuid4().hex
+        self.experiment, self.place, self.writer = "", place, f"{place}-{uuid.uuid4().hex}"
         self.tags: dict[str, str] = {}  # of the experiment
         self.created_ms = 0  # since 1970
         self.runs: dict[Key, list[Run]] = {}  # the finished ones, as far as this process knows
@@ -66,14 +73,16 @@ class Log:
         self.client.get_experiment_by_name(self.study)
 
     def start(self) -> None:
-        """Learns of the runs that are there; those that crashes have left are removed.
-
-        A live writer's run may be among these: it finds out, and begins another one.
-        """
+        """Learns of the runs that are there; those that crashes have left are removed: at once those of writers of the
+        same results, which are dead, and after a while those of others, which may live."""
         self._find_experiment()
         runs = self._search("")
-        self._delete(run for found in runs.values() for run in found if not run.finished)
+        self._delete(run for found in runs.values() for run in found if not run.finished and self._is_dead(run))
         self.runs = {key: [run for run in found if run.finished] for key, found in runs.items()}
+
+    def _is_dead(self, run: Run) -> bool:
+        ours = bool(self.place) and run.writer.startswith(self.place)
+        return ours or not self.shared or time.time() - run.begun_s > DEAD_S
 
     def describe(self, tags: Mapping[str, str]) -> None:
         """Sets tags of the experiment, those that it does not have yet."""
@@ -102,7 +111,7 @@ class Log:
                 known = self._finished(key)  # others may have been here since
             if not any(run.fingerprint == now for run in known):
                 try:
-                    made = self._write(told(), {FINGERPRINT: now, WRITER: self.writer})
+                    made = self._write(told(), {FINGERPRINT: now, WRITER: self.writer, BEGUN: str(int(time.time()))})
                 except _GoneError:
                     continue
                 new, known = True, self._finished(key) if self.shared else [*known, made]
@@ -119,32 +128,47 @@ class Log:
         """The finished run of the key, as far as this process knows."""
         return next(iter(self.runs.get(key, [])), None)
 
-    def add(self, key: Key, points: Mapping[str, Sequence[Number]], ended_ms: int) -> bool:
-        """Adds the points, by ratio, that the summary does not have; False, and nothing is added, where it has others
-        than these, or another writer has removed it.
+    def add(self, key: Key, points: Mapping[str, Sequence[Number]], ended_ms: int, whole: bool) -> bool:
+        """Adds the points, by ratio, that the summary does not have; False, and it is no longer known, where it has
+        others for these ratios, or with `whole` for any other, with which it is removed, or where it is gone.
 
         Repeating it does no harm: MLflow has each number of a metric, step and time once.
         """
         from mlflow.entities import Metric, RunTag
 
-        run = self.runs[key][0]
+        run = self._now(key)
         told = {ratio: _digest(numbers) for ratio, numbers in points.items()}
-        if any(told.get(ratio) != known for ratio, known in run.points.items()):
-            return False
+        if run is None or run.differs(told, whole):
+            return self._forget(key, told, whole)
         missing = [ratio for ratio in told if ratio not in run.points]
         if missing:
             numbers = dict.fromkeys(number for ratio in missing for number in points[ratio])
-            tag = RunTag(POINTS, json.dumps(told))
+            tags = [RunTag(f"{POINT}{ratio}", told[ratio]) for ratio in missing]
             with self._unless_gone(run.id) as gone:
-                self.client.log_batch(run.id, metrics=[Metric(*number) for number in numbers], tags=[tag])
+                self.client.log_batch(run.id, metrics=[Metric(*number) for number in numbers], tags=tags)
                 self.client.set_terminated(run.id, "FINISHED", end_time=ended_ms)
-            if gone:
-                return False
-            self.runs[key] = [replace(run, points=told)]
+            self.runs[key] = [replace(run, points={**run.points, **told})]
+            run = self._now(key)  # another may have added the same ratio with other numbers
+            if gone or run is None or run.differs(told, whole):
+                return self._forget(key, told, whole)
         return True
 
-    def forget(self, key: Key) -> None:
-        """Removes the runs of the key."""
+    def _now(self, key: Key) -> Run | None:
+        """The run of the key as it is; None where it is gone."""
+        run = self.known(key)
+        if run is None or not self.shared:
+            return run
+        found = self.client.get_run(run.id)
+        return _run(found) if found.info.lifecycle_stage == "active" else None
+
+    def _forget(self, key: Key, told: Mapping[str, str], whole: bool) -> bool:
+        """Removes the summary where it differs: another may have made it anew, and that one is right. False."""
+        self._delete(found for found in self._finished(key) if found.differs(told, whole))
+        self.runs.pop(key, None)
+        return False
+
+    def remove(self, key: Key) -> None:
+        """Removes all finished runs of the key."""
         self._delete(self._finished(key))
         self.runs.pop(key, None)
 
@@ -162,7 +186,8 @@ class Log:
             _tracked_run.write(self.client, self.experiment, told, tags, made.append)
         if gone:
             raise _GoneError
-        return Run(made[0], True, tags[FINGERPRINT], self.writer, told.started_ms, told.also.get(PARENT, ""))
+        parent = told.also.get(PARENT, "")
+        return Run(made[0], True, tags[FINGERPRINT], self.writer, told.started_ms, time.time(), parent)
 
     @contextlib.contextmanager
     def _unless_gone(self, run: str | list[str]) -> Iterator[list[str]]:
@@ -222,14 +247,6 @@ class Log:
         self._delete(run for run in runs if run.writer == self.writer and not run.finished)
         return [run for run in runs if run.finished]
 
-    def drop(self, key: Key, fingerprint: str) -> bool:
-        """Removes the run of the key where it is the one of the fingerprint; whether it was."""
-        old = [run for run in self.runs.get(key, []) if run.fingerprint == fingerprint]
-        self._delete(old)
-        if old:
-            self.runs.pop(key)
-        return bool(old)
-
     def _delete(self, runs: Iterable[Run]) -> None:
         """MLflow keeps what is deleted; its files are removed where they lie beside the results."""
         for run in list(runs):
@@ -253,16 +270,14 @@ def _digest(numbers: Sequence[Number]) -> str:
 
 def _run(found: Any) -> Run:
     tags, info = found.data.tags, found.info
-    try:
-        points = json.loads(tags.get(POINTS, "{}"))
-    except ValueError:
-        points = {"": "unreadable"}  # which no point is: the run is made anew
+    begun = tags.get(BEGUN, "")
     return Run(
         id=info.run_id,
         finished=info.status == "FINISHED",
         fingerprint=tags.get(FINGERPRINT, ""),
         writer=tags.get(WRITER, ""),
         started=info.start_time,
+        begun_s=float(begun) if begun.isdigit() else 0.0,
         parent=tags.get(PARENT, ""),
-        points=points if isinstance(points, dict) else {"": "unreadable"},
+        points={key.removeprefix(POINT): value for key, value in tags.items() if key.startswith(POINT)},
     )

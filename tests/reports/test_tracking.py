@@ -328,7 +328,7 @@ def test_the_page_is_a_run_and_the_verdict_is_said(store, monkeypatch):
     client = MlflowClient(tracking_uri=tracking.uri)
     assert {item.path for item in client.list_artifacts(run)} == {"index.html", "results.csv"}
     note = known(client.get_experiment_by_name("demo")).tags["mlflow.note.content"]
-    assert f"(#/experiments/1/runs/{run}/artifacts/index.html)" in note.partition("\n")[0]
+    assert f"(#/experiments/1/runs/{run}/artifacts/index.html?workflowType=machine_learning)" in note.partition("\n")[0]
     assert "maxmin is as good as uniform." in note
     page.write_text("<html> </html>")
     other = _tracking_page.publish(about(), results, tracking)["run"]
@@ -416,6 +416,52 @@ def test_a_cell_that_is_out_of_date_loses_its_run_and_its_place_in_the_summary(s
     write_cell(results, rows[0], 12.0)
     _, _, cells = again(rows[1:])
     assert len(cells) == len(rows)
+    # one whose training is new and has no score goes: it was scored here
+    results.joinpath("cells", *rows[0].values(), "metrics.json").unlink()
+    _, _, cells = again(rows[1:])
+    assert len(cells) == len(rows) - 1
+
+
+def test_what_the_study_does_not_have_any_more_goes(store):
+    results, tracking = store
+    track(results, tracking)
+    track(results, tracking, ROWS[:2], about(rows=ROWS[:2]))
+    assert [run.info.run_name for run in runs_of(tracking, "summary")[1]] == ["random · room"]
+    assert {run.data.params["selector"] for run in runs_of(tracking)[1]} == {"random"}
+
+
+def test_a_summary_that_is_there_twice_is_there_once(store):
+    results, tracking = store
+    track(results, tracking)
+    client, runs = runs_of(tracking, "summary")
+    twin = client.create_run(runs[0].info.experiment_id, tags=runs[0].data.tags)
+    client.set_terminated(twin.info.run_id)
+    track(results, tracking)
+    assert len(runs_of(tracking, "summary")[1]) == 2
+
+
+@pytest.mark.parametrize(("file", "change"), [("train", {"seconds": 1e300}), ("train", {"began": "9999-01-01T00:00Z"})])
+def test_times_that_no_database_takes_are_named(store, file, change):
+    results, tracking = store
+    path = results.joinpath("cells", *ROWS[0].values(), f"{file}.json")
+    record = {**json.loads(path.read_text()), **change}
+    record["curve"] += [{"step": 1e30, "seconds": 1.0, "loss": 1.0}, {"step": 1, "seconds": float("nan"), "loss": 1.0}]
+    if "seconds" in change:
+        del record["began"]
+    path.write_text(json.dumps(record))
+    with pytest.raises(
+        UserError, match=r"took 3 of 4 cells, first without splat/room/random/0\.1/0: .*not as viewbench"
+    ):
+        track(results, tracking)
+
+
+def test_a_link_for_a_record_is_not_followed(store, tmp_path):
+    results, tracking = store
+    path = results.joinpath("cells", *ROWS[0].values(), "selection.json")
+    path.rename(tmp_path / "elsewhere.json")
+    path.symlink_to(tmp_path / "elsewhere.json")
+    with pytest.raises(UserError, match="is a link"):
+        track(results, tracking)
 
 
 def test_files_of_runs_that_are_replaced_go(store, tmp_path):

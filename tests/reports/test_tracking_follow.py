@@ -17,7 +17,7 @@ from tests.reports.test_tracking import ROWS, about, counts, describe, history, 
 from viewbench.common.cells import cell_folder, cell_name
 from viewbench.common.settings import Tracking
 from viewbench.common.settings import load as load_settings
-from viewbench.reports import _tracked_link, _tracking, _tracking_follow
+from viewbench.reports import _tracked_link, _tracking, _tracking_follow, _tracking_turn
 from viewbench.reports._tracking_follow import LOOK_S, SETTLE_S, Follower
 from viewbench.workflow import _study
 
@@ -94,6 +94,7 @@ def test_what_it_logs_is_what_the_end_of_the_study_logs(study):
     # from which the dashboard knows where the figure is while the study runs
     assert list(_tracked_link.figures(results.parent, tracking.uri)) == ["demo"]
     assert _tracked_link.figures(results.parent, "sqlite:///another.db") == {}
+    assert told["store"] == tracking.uri
 
 
 def test_a_cell_that_is_scored_again_is_logged_again(study):
@@ -167,18 +168,54 @@ def test_a_locked_database_is_tried_again_and_said_once(study, monkeypatch):
 
 
 def test_another_that_logs_the_study_is_not_waited_for(study):
-    from viewbench.common import holding
-
     results, tracking, clock = study
     write_cell(results, ROWS[0])
     said = []
     one = follower(study, say=said.append)
-    with holding.alone(results / "logs" / "track"):
+    with _tracking_turn.turn(tracking.uri, "demo", results, "another", 1):
         looks(one, clock)
     assert said == []
     clock.now += _tracking_follow.AWAY_S
     looks(one, clock)
     assert len(runs_of(tracking)[1]) == 1
+
+
+def test_what_others_have_logged_meanwhile_is_not_logged_again(study):
+    """As the end of the study does with its last cells, which this process was about to log."""
+    results, tracking, clock = study
+    one, other = follower(study), follower(study)
+    write_cell(results, ROWS[0])
+    looks(one, clock)
+    for row in ROWS[1:]:
+        write_cell(results, row)
+    one.due()
+    with _tracking_turn.turn(tracking.uri, "demo", results, "the end of the study", 1):
+        _tracking.track(about(), ROWS, results, tracking)
+    clock.now += SETTLE_S
+    one.log(one.due())
+    looks(other, clock)
+    assert sorted(run.data.tags[_tracking.CELL] for run in runs_of(tracking)[1]) == sorted(map(cell_name, ROWS))
+    assert len(runs_of(tracking, "summary")[1]) == 2
+    assert counts(_tracking.track(about(), ROWS, results, tracking)) == {"logged": 0, "kept": 4}
+
+
+def test_many_cells_take_turns(study):
+    results, tracking, clock = study
+    rows = [{**ROWS[0], "seed": str(seed)} for seed in range(_tracking_follow.AT_ONCE + 2)]
+    for row in rows:
+        write_cell(results, row)
+    one = Follower(about(rows=rows), rows, results, tracking, clock=clock)
+    one.due()
+    clock.now += SETTLE_S
+    for count in (_tracking_follow.AT_ONCE, len(rows)):
+        one.go_on(_once())
+        assert len(runs_of(tracking)[1]) == count
+
+
+def _once():
+    """Stops after one look, and not in the middle of it."""
+    waits = iter([False, True])
+    return lambda wait_s: next(waits) if wait_s else False
 
 
 STUDY = """title: A study to follow
@@ -266,7 +303,7 @@ def test_one_run_a_cell_however_often_the_process_is_killed(folder):
         one = Process(folder, uri)
         write_cell(results, cell)
         if kill % 2:  # at its start, or in the middle of logging
-            until((results / "logs" / "track" / ".writer").exists)
+            until((folder / ".mlflow.db.writers" / "demo" / ".writer").exists)
         time.sleep(chance.uniform(0, 0.4))
         one.process.send_signal(signal.SIGKILL)
         one.process.communicate()
@@ -283,7 +320,7 @@ def test_one_run_a_cell_however_often_the_process_is_killed(folder):
             text=True,
         )
         assert done.returncode == 0, done.stderr
-    assert done.stdout == "0 logged, 8 kept\n"
+    assert done.stdout.startswith("0 logged, 8 kept\nFigure 4 in MLflow: http://127.0.0.1:5000/#/experiments/")
     assert names_of(tracking) == Counter(map(cell_name, cells))
     client, summaries = runs_of(tracking, "summary")
     assert len(summaries) == 2

@@ -81,7 +81,7 @@ def test_all_recordings_that_ship_can_be_read_for_it(tracking):
 def test_a_study_of_another_machine_is_logged_with_its_files(tracking, tmp_path):
     study = make_study(tmp_path, scenes=("room_human",), selectors=("uniform", "maxmin"), ratios=(0.1,), seeds=(0, 1))
     done = bring(study, tracking)
-    client, _, cells = runs_of(tracking, "fake", "cell")
+    client, _, cells = runs_of(tracking, "fake, imported", "cell")
     assert done["logged"] == len(cells) == 5
     for run in cells:
         files = {item.path for item in client.list_artifacts(run.info.run_id)}
@@ -92,7 +92,7 @@ def test_a_study_of_another_machine_is_logged_with_its_files(tracking, tmp_path)
     _run.run(study, "table-psnr")
     _run.page(study)
     assert "run" in bring(study, tracking)
-    _, experiment, (report,) = runs_of(tracking, "fake", "report")
+    _, experiment, (report,) = runs_of(tracking, "fake, imported", "report")
     assert report.info.run_id in experiment.tags["mlflow.note.content"].partition("\n")[0]
     assert _page.verdict(_study.load(study))[0] in experiment.tags["mlflow.note.content"]
 
@@ -100,6 +100,9 @@ def test_a_study_of_another_machine_is_logged_with_its_files(tracking, tmp_path)
 def test_a_folder_that_is_neither_is_named(tracking, tmp_path):
     with pytest.raises(UserError, match=r"neither about\.json nor study\.json"):
         bring(tmp_path, tracking)
+    for name in ("../../evil", "", " x", "/tmp/evil"):
+        with pytest.raises(UserError, match="no name of an experiment"):
+            bring(QUICK, tracking, name or "..")
     with pytest.raises(UserError, match="nothing to log to"):
         bring(QUICK, Tracking(uri=""))
     (tmp_path / "about.json").write_text("{}")
@@ -111,4 +114,12 @@ def test_track_names_what_it_wants(run_viewbench, tmp_path):
     failed = run_viewbench("track", cwd=tmp_path)
     assert failed.returncode == 2
     assert "name a study, or a folder with --import" in failed.stderr
+    failed = run_viewbench("track", "tiny", cwd=tmp_path)
+    assert "run the study first" in failed.stderr
+    assert list(tmp_path.iterdir()) == []
+    for options in (["tiny"], ["--follow"], ["--only", "page"]):
+        failed = run_viewbench("track", "--import", QUICK, *options, cwd=tmp_path)
+        assert failed.returncode == 2
+        assert "--import does not go with" in failed.stderr
+    (tmp_path / "results" / "tiny").mkdir(parents=True)
     assert _tracking.NO_TRACKING in run_viewbench("track", "tiny", cwd=tmp_path, VIEWBENCH_TRACKING_URI="").stdout

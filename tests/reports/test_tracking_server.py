@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 import uuid
+from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
@@ -17,6 +18,10 @@ from viewbench.common.cells import cell_name
 from viewbench.common.errors import UserError
 from viewbench.common.settings import Tracking
 from viewbench.reports import _tracking
+from viewbench.reports._tracked_cell import StudyCells
+from viewbench.reports._tracked_study import Tracked
+from viewbench.reports._tracked_summary import group_of
+from viewbench.reports._tracking_log import Log
 
 FILES = {"selection.json", "train.json", "metrics.json", "renders", "model"}
 
@@ -189,6 +194,19 @@ def test_eight_writers_of_all_cells_at_once_in_an_experiment_that_is_not_there(s
     assert_right(server, name)
 
 
+def test_who_logs_to_a_server_begins_somewhere_and_leaves_nothing_out(study):
+    rows = [{**row, "ratio": str(ratio)} for row in ROWS for ratio in (0.1, 0.2, 0.3)]
+
+    def turned(uri):
+        return _tracking._turned(rows, Log(None, uri, "demo", Tracking()))
+
+    assert turned("sqlite:///mlflow.db") == rows
+    orders = [turned("http://127.0.0.1:5000") for _ in range(40)]
+    assert all(sorted(map(cell_name, order)) == sorted(map(cell_name, rows)) for order in orders)
+    assert len({cell_name(order[0]) for order in orders}) > 1
+    assert _tracking._turned([], Log(None, "http://127.0.0.1:5000", "demo", Tracking())) == []
+
+
 def test_a_run_that_another_removes_is_begun_again(server, proxy, study):
     name, results = study
     removed = []
@@ -220,6 +238,44 @@ def test_a_cell_that_is_made_anew_while_it_is_logged_is_logged_anew(server, prox
     assert_right(server, name, ROWS[:1])
 
 
+@pytest.mark.parametrize("change", ["a score", "a summary that is removed"])
+def test_a_summary_that_another_has_made_anew_is_kept(server, proxy, study, change):
+    """Of two who know the same run, which goes, the second takes that of the first: eight would go on without end."""
+    name, results = study
+    tracking = Tracking(uri=proxy.url)
+    if change == "a score":
+        write_cell(results, ROWS[0], psnr_db=15.0)
+    log(name, ROWS[:2], results, tracking)
+    write_cell(results, ROWS[0])
+    rows = [*ROWS[:2], *({**row, "ratio": "0.2"} for row in ROWS[:2])]
+    for row in rows[2:]:
+        write_cell(results, row)
+    both = []
+    for _ in range(2):
+        own = _tracking.open_log(name, tracking, 1, 5)
+        own.start()
+        both.append(Tracked(about(name, rows), StudyCells(about(name, rows), results, tracking), own))
+    client, (old,) = runs_of(server, name)[0], [run for run in runs_of(server, name)[1] if is_summary(run)]
+    if change != "a score":
+        client.delete_run(old.info.run_id)
+    for one in both:
+        for row in rows:
+            one.cell(row)
+        one.summary(group_of(rows[0]), rows)
+    _, runs = runs_of(server, name)
+    (summary,) = [run for run in runs if is_summary(run)]
+    assert summary.info.run_id != old.info.run_id
+    assert {known(one.log.known(("summary", "splat/room/random"))).id for one in both} == {summary.info.run_id}
+    history = client.get_metric_history(summary.info.run_id, "psnr_db")
+    assert [(point.step, point.value) for point in history] == [(10, 20.0), (20, 20.0)]
+    cells = [run for run in runs if not is_summary(run)]
+    assert [run.data.tags["mlflow.parentRunId"] for run in cells] == 4 * [summary.info.run_id]
+
+
+def is_summary(run):
+    return run.data.tags["viewbench.kind"] == "summary"
+
+
 def test_an_experiment_that_was_deleted_is_restored_without_what_was_removed(server, proxy, study):
     name, results = study
     tracking = Tracking(uri=proxy.url)
@@ -246,8 +302,9 @@ def test_a_cell_takes_few_requests(server, proxy, study):
     for row in rows:
         write_cell(results, row)
     _tracking.track(about(name, [*ROWS, *rows]), rows, results, tracking)
-    # seven files; two searches, to begin, numbers, data set, to end; and a summary without files, with a point
-    start, cell, summary = 2, 7 + 2 + 4, 2 + 4 + 2
+    # seven files; two searches, to begin, numbers, data set, to end; a summary without files, with a point, which is
+    # looked at before and after
+    start, cell, summary = 2, 7 + 2 + 4, 2 + 4 + 2 + 2
     assert sum(proxy.requests.values()) == start + 2 * cell + summary
     log(name, ROWS, results, tracking)
     proxy.calm()
@@ -295,7 +352,7 @@ USERS = {"": "Bearer tok/en-4711", "ann:pass%23word@": "Basic YW5uOnBhc3Mjd29yZA
 def test_no_password_is_told(server, proxy, study, user, header, monkeypatch, capfd, caplog):
     name, results = study
     monkeypatch.setenv("MLFLOW_TRACKING_TOKEN", "tok/en-4711")
-    tracking = Tracking(uri=proxy.url.replace("//", f"//{user}"), patience=1)
+    tracking = Tracking(uri=proxy.url.replace("//", f"//{user}"), patience=0)
     log(name, ROWS[:1], results, tracking)
     assert {sent["Authorization"] for sent in proxy.headers} == {header}
     said = []
@@ -303,7 +360,7 @@ def test_no_password_is_told(server, proxy, study, user, header, monkeypatch, ca
     with pytest.raises(UserError) as first:
         log(name, [ROWS[1]], results, tracking)
     with pytest.raises(UserError) as second:
-        log(name, ROWS, results, tracking, say=said.append)
+        log(name, ROWS, results, replace(tracking, patience=5), say=said.append)
     nobody = Tracking(uri=f"http://{user}127.0.0.1:9", patience=0)
     with pytest.raises(UserError) as third:
         log(name, ROWS, results, nobody)

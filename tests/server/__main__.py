@@ -3,163 +3,28 @@
     python -m tests.server FOLDER [--cells N] [--writers N] [--install]          (or: make test-server)
 
 FOLDER keeps the packages of the server; everything else lies in a temporary folder. Raises AssertionError where a cell
-has not exactly one finished run in the end, or a password is found in a file. Ten minutes on two cores.
+or a summary has not exactly one finished run with all that belongs to it in the end (`checks.py`), or a password is
+found in a file. Ten minutes on two cores.
 """
 
 import argparse
 import json
 import os
 import random
-import signal
 import subprocess
 import sys
 import tempfile
-import threading
 import time
-from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from tests.reports.mlflow_server import Proxy, Server
-from tests.reports.test_tracking import write_cell
+from tests.server.checks import check, has_password, missing
+from tests.server.machines import PASSWORD, USER, Machine, Study, all_at_once
 from tests.server.postgres import Postgres, packages, programs
-from viewbench.common.cells import cell_name
-from viewbench.common.settings import load as load_settings
-from viewbench.reports import _tracking
-from viewbench.workflow import _study
+from tests.server.trouble import Trouble, loses_some
 
-USER, PASSWORD = "admin", "a-word-4711-nobody-says"
-STUDY = """title: A study for a server
-scenes: [room_human]
-selectors: [uniform, random, maxmin, kcenter]
-ratios: [{ratios}]
-seeds: [0, 1]
-backends: [{{name: splat, backend: splat, budget: {{iterations: 20}}}}]
-width: 48
-reference: false
-"""
-APART = 40  # requests between two restarts
-AGAIN = 20  # times that a job is begun which found nobody, as another of a long study would be
-EVERY = 7  # of the writers is killed, of the cells has two writers, and of a hundred answers so many are lost
-
-
-class Study:
-    """A file of a study, its results and its address."""
-
-    def __init__(self, folder: Path, name: str, address: str, cells: int):
-        self.name, self.folder, self.file = name, folder, folder / f"{name}.yaml"
-        ratios = ", ".join(f"{0.02 + 0.01 * i:.2f}" for i in range(max(1, cells // 6)))
-        self.file.write_text(STUDY.format(ratios=ratios), encoding="utf-8")
-        self.cells = _study.load(str(self.file), load_settings()).cells()
-        self.results = folder / "results"
-        self.environment = {
-            **os.environ,
-            "VIEWBENCH_TRACKING_URI": address,
-            "VIEWBENCH_TRACKING_PATIENCE": "240",
-            "MLFLOW_TRACKING_USERNAME": USER,
-            "MLFLOW_TRACKING_PASSWORD": PASSWORD,
-        }
-        self.said: Counter[str] = Counter()
-        self.seconds: list[float] = []
-
-    def make_cells(self) -> None:
-        for cell in self.cells:
-            write_cell(self.results / self.name, cell)
-
-    def track(self, *options: str, kill_after_s: float | None = None) -> int:
-        """Runs `viewbench track`, as a job does."""
-        command = [sys.executable, "-m", "viewbench", "track", str(self.file), "--results", str(self.results), *options]
-        begun, killed = time.monotonic(), False
-        process = subprocess.Popen(
-            command, env=self.environment, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        try:
-            out, errors = process.communicate(timeout=kill_after_s)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            killed = True
-            out, errors = process.communicate()
-        self.seconds.append(time.monotonic() - begun)
-        assert PASSWORD not in out + errors
-        assert "Traceback" not in errors, errors
-        said = {"was not asked": "not asked, since it was away", "the end of the study tries again": "found it away"}
-        ended = next((words for text, words in said.items() if text in errors), "logged")
-        self.said["killed" if killed else ended if not process.returncode else "failed"] += 1
-        return process.returncode
-
-    def track_cells(self, writers: int) -> None:
-        """So many at once; some cells have two writers, and some writers are killed."""
-        jobs = [(cell, False) for cell in self.cells]
-        jobs += [(cell, False) for cell in self.cells[::EVERY]] + [(cell, True) for cell in self.cells[3::EVERY]]
-        random.Random(0).shuffle(jobs)
-
-        def write(number: int, cell: dict[str, str], killed: bool) -> None:
-            stamp = self.folder / f"stamp-{number}.json"
-            after_s = random.Random(number).uniform(2, 12) if killed else None
-            for _ in range(AGAIN if number % EVERY else 1):
-                self.track("--cell", cell_name(cell), "--stamp", str(stamp), kill_after_s=after_s)
-                if killed or "skipped" not in json.loads(stamp.read_text(encoding="utf-8")):
-                    break
-
-        with ThreadPoolExecutor(writers) as pool:
-            for done in [pool.submit(write, number, *job) for number, job in enumerate(jobs)]:
-                done.result()
-
-    def check(self, where: str) -> str:
-        """Counts the runs, asking the server itself."""
-        from mlflow import MlflowClient
-
-        client = MlflowClient(tracking_uri=where)
-        experiment = client.get_experiment_by_name(self.name)
-        assert experiment is not None
-        runs = client.search_runs([experiment.experiment_id], max_results=5000)
-        each = Counter(run.data.tags[_tracking.CELL] for run in runs)
-        states = Counter(run.info.status for run in runs)
-        assert set(each) == set(map(cell_name, self.cells)), f"{len(each)} of {len(self.cells)} cells have a run"
-        assert set(each.values()) == {1}, each.most_common(3)
-        assert set(states) == {"FINISHED"}, states
-        whole = [run for run in runs if {"psnr_db", "train_s"} <= set(run.data.metrics)]
-        files = Counter(len(client.list_artifacts(run.info.run_id)) for run in runs)
-        assert len(whole) == len(runs), f"{len(runs) - len(whole)} runs are not whole"
-        assert set(files) == {4}, files
-        deleted = len(client.search_runs([experiment.experiment_id], run_view_type=2, max_results=5000))
-        return (
-            f"{len(self.cells)} cells, runs a cell {set(each.values())}, {dict(states)}, {deleted} removed on the way"
-        )
-
-
-class Trouble(threading.Thread):
-    """Restarts and kills the server and its database, one after the other, until it is told to stop."""
-
-    def __init__(self, server: Server, postgres: Postgres, study: Study, proxy: Proxy):
-        super().__init__(daemon=True)
-        self.server, self.postgres, self.study, self.proxy = server, postgres, study, proxy
-        self.over, self.done = threading.Event(), Counter[str]()
-
-    def run(self) -> None:
-        while True:
-            for name, cause in {
-                "PostgreSQL restarted": lambda: self.postgres.control("restart", "-m", "fast"),
-                "server SIGTERM": lambda: self.restart(signal.SIGTERM),
-                "PostgreSQL crashed": lambda: self.postgres.control("restart", "-m", "immediate"),
-                "server SIGKILL": lambda: self.restart(signal.SIGKILL),
-            }.items():
-                enough = sum(self.proxy.requests.values()) + APART
-                while sum(self.proxy.requests.values()) < enough:
-                    if self.over.wait(0.1):
-                        return
-                cause()
-                self.done[name] += 1
-                # As if the minutes had gone by after which jobs ask again.
-                (self.study.results / self.study.name / "logs" / "track" / "away.json").unlink(missing_ok=True)
-
-    def restart(self, how: int) -> None:
-        self.server.stop(how)
-        self.server.start()
-
-    def stop(self) -> None:
-        self.over.set()
-        self.join()
+COMES_S, LAG_S = 3.0, 15.0  # seconds from one cell to the next, and within which it comes to all machines
+CATCH_UP_S = 240.0  # after the last cell, for the processes that follow
 
 
 def main() -> None:
@@ -190,72 +55,122 @@ def rehearse(folder: Path, bin_folder: Path, paths: str, cells: int, writers: in
     variables["MLFLOW_FLASK_SERVER_SECRET_KEY"] = "of a test"
     server = Server(folder / "server", "--app-name", "basic-auth", store=postgres.uri, **variables)
     proxy = Proxy(server.url)
+    work = folder / "work"
+    work.mkdir()
+    began = time.monotonic()
     try:
         server.start()
-        proxy.loses = loses_some()
-        one_by_one(Study(folder, "jobs", proxy.url, cells), server, postgres, proxy, writers)
-        at_once(Study(folder, "together", proxy.url, cells // 2), server, proxy, writers)
-        by_snakemake(Study(folder, "whole", proxy.url, 12), server, postgres, proxy, writers)
+        followed(Study(work, "followed", proxy.url, cells), server, postgres, proxy, writers)
+        at_once(Study(work, "together", proxy.url, cells // 2), server, proxy, writers)
+        a_real_one(Study(work, "whole", proxy.url, 12), server, postgres, proxy, writers)
     finally:
         server.stop()
         postgres.control("stop", "-m", "immediate")
-    files = [path for name in ("results", ".snakemake") for path in (folder / name).rglob("*") if path.is_file()]
-    told = [path for path in files if PASSWORD.encode() in path.read_bytes()]
+    files = [path for path in work.rglob("*") if path.is_file()]
     assert files
-    assert not told, told
-    print("no file of results/ or .snakemake/ has the password", flush=True)
+    assert not has_password(work), has_password(work)
+    print(f"no password in {len(files)} files of the studies; {time.monotonic() - began:.0f} s in all", flush=True)
 
 
-def loses_some():
-    """EVERY % of the answers, always the same ones."""
-    chance = random.Random(1)
-    return lambda method, path: chance.random() < EVERY / 100
+def followed(study: Study, server: Server, postgres: Postgres, proxy: Proxy, writers: int) -> None:
+    """Cells come one by one to so many machines, each of which has a process that follows; these are killed, too."""
+    made, chance = study.make_cells(), random.Random(0)
+    machines = [Machine(study, number, made) for number in range(writers)]
+    harm(proxy)
 
+    def killed() -> None:
+        machine = chance.choice(machines)
+        machine.kill()
+        machine.follow()
 
-def one_by_one(study: Study, server: Server, postgres: Postgres, proxy: Proxy, writers: int) -> None:
-    """A job a cell, `writers` at once, in an experiment that is not there yet."""
-    study.make_cells()
-    trouble = Trouble(server, postgres, study, proxy)
-    trouble.start()
-    study.track_cells(writers)
-    longest_s = max(study.seconds)
-    print(f"jobs: {writers} at once, {dict(study.said)}, {sum(proxy.requests.values())} requests", flush=True)
-    print(f"  the longest job {longest_s:.0f} s", flush=True)
-    code = study.track()
-    trouble.stop()
-    print(f"  during these: {dict(trouble.done)}; the end of the study: exit status {code}", flush=True)
-    assert not study.track()
-    print(f"  {study.check(server.url)}", flush=True)
+    cells = chance.sample(study.cells, len(study.cells))
+    comes = [
+        (COMES_S * number + chance.uniform(0, LAG_S), machine, cell)
+        for number, cell in enumerate(cells)
+        for machine in range(writers)
+    ]
+    for machine in machines:
+        machine.follow()
+    with Trouble(server, postgres, proxy, killed) as trouble:
+        began = time.monotonic()
+        try:
+            for at, number, cell in sorted(comes, key=lambda one: one[0]):
+                while time.monotonic() < began + at:
+                    time.sleep(0.05)
+                machines[number].take(cell)
+            end = time.monotonic() + CATCH_UP_S
+            while time.monotonic() < end and any(one.account()["cells"] < len(cells) for one in machines):
+                time.sleep(1)
+            trouble.spare()
+            counts = sorted(int(one.account()["cells"]) for one in machines)
+            ends_s = max(machine.end() for machine in machines)
+        except BaseException:
+            trouble.spare()
+            for machine in machines:
+                machine.kill()
+            raise
+        asked = trouble.asked()
+        print(f"followed by {writers} machines: {dict(trouble.done)}")
+        print(f"  cells that each had seen logged: {counts} of {len(cells)}; the longest to end took {ends_s:.0f} s")
+        print(f"  {asked} requests, {asked / len(cells):.0f} a cell", flush=True)
+        print(f"  track by {writers} at once: {all_at_once(machines)}; {dict(trouble.done)} in all", flush=True)
+    print(f"  before the last: {missing(server.url, study)} cells without a run", flush=True)
+    once_more(machines[0])
+    said = "".join(machine.said.read_text(encoding="utf-8") for machine in machines)
+    assert "Traceback" not in said, said[-3000:]
+    print(f"  {check(study, made, server.url)}", flush=True)
 
 
 def at_once(study: Study, server: Server, proxy: Proxy, writers: int) -> None:
-    """The whole study, by several at once."""
-    study.make_cells()
-    with ThreadPoolExecutor(writers) as pool:
-        codes = list(pool.map(lambda _: study.track(), range(writers)))
-    print(f"whole study by {writers} at once: exit status {Counter(codes)}", flush=True)
-    assert not study.track()
-    print(f"  {study.check(server.url)}", flush=True)
+    """The whole study from nothing, by several at once."""
+    made = study.make_cells()
+    machines = [Machine(study, number, made) for number in range(writers)]
+    for machine in machines:
+        for cell in study.cells:
+            machine.take(cell)
+    harm(proxy)
+    print(f"the whole study by {writers} machines at once: {all_at_once(machines)}")
+    asked = sum(proxy.requests.values())
+    print(f"  {asked} requests, {asked / len(study.cells):.0f} a cell", flush=True)
+    once_more(machines[0])
+    print(f"  {check(study, made, server.url)}", flush=True)
 
 
-def by_snakemake(study: Study, server: Server, postgres: Postgres, proxy: Proxy, writers: int) -> None:
+def a_real_one(study: Study, server: Server, postgres: Postgres, proxy: Proxy, writers: int) -> None:
     """A study that is trained, too, its name and password in the address."""
-    proxy.calm()
     address = proxy.url.replace("//", f"//{USER}:{PASSWORD}@")
     study.environment = {**study.environment, "VIEWBENCH_TRACKING_URI": address}
     for name in ("MLFLOW_TRACKING_USERNAME", "MLFLOW_TRACKING_PASSWORD"):
         del study.environment[name]
-    proxy.loses = loses_some()
-    trouble = Trouble(server, postgres, study, proxy)
-    trouble.start()
+    harm(proxy)
     command = [sys.executable, "-m", "viewbench", "run", str(study.file), "-j", str(writers)]
-    done = subprocess.run(command, env=study.environment, cwd=study.folder, capture_output=True, text=True)
-    trouble.stop()
+    with Trouble(server, postgres, proxy) as trouble:
+        done = subprocess.run(command, env=study.environment, cwd=study.folder, capture_output=True, text=True)
     assert PASSWORD not in done.stdout + done.stderr
     assert done.returncode == 0, done.stderr
-    print(f"snakemake -j{writers}: {sum(proxy.requests.values())} requests, {dict(trouble.done)}", flush=True)
-    stamp = json.loads((study.results / study.name / "tracked.json").read_text(encoding="utf-8"))
-    print(f"  the end of the study: {stamp}; {study.check(server.url)}", flush=True)
+    results = study.folder / "results" / study.name
+    track = results / "logs" / "track"
+    account = json.loads((track / "follow.json").read_text(encoding="utf-8"))
+    said = (track / "follow.log").read_text(encoding="utf-8")
+    stamp = json.loads((results / "tracked.json").read_text(encoding="utf-8"))
+    print(f"viewbench run -j{writers}: {sum(proxy.requests.values())} requests, {dict(trouble.done)}")
+    print(f"  followed: {account}, said {len(said.splitlines())} lines; the end of the study: {stamp}", flush=True)
+    assert "Traceback" not in said, said
+    assert "skipped" not in stamp, stamp
+    print(f"  {check(study, results, server.url, page=True)}", flush=True)
+
+
+def once_more(machine: Machine) -> None:
+    """`track` when all is calm."""
+    last = machine.track()
+    assert last.returncode == 0, last.stderr
+    print(f"  once more: {last.stdout.strip()}")
+
+
+def harm(proxy: Proxy) -> None:
+    """Begins to count anew, and to lose answers."""
+    proxy.calm()
+    proxy.loses = loses_some()
 
 
 if __name__ == "__main__":

@@ -50,7 +50,8 @@ class Postgres:
 
     def control(self, what: str, *options: str) -> None:
         """`pg_ctl` start, stop or restart."""
-        settings = f"-p {self.port} -c listen_addresses=127.0.0.1 -c unix_socket_directories={self.folder}"
+        # Without waiting for the disk, which only a machine that loses its power needs.
+        settings = f"-p {self.port} -c fsync=off -c listen_addresses=127.0.0.1 -c unix_socket_directories={self.folder}"
         log = str(self.folder / "log")
         self._run("pg_ctl", "-D", str(self.folder / "data"), "-w", "-l", log, "-o", settings, *options, what)
 

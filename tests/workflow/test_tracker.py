@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import known, until
-from tests.reports.test_tracking import describe
-from viewbench.reports import _tracked_link
+from tests.reports.test_tracking import ROWS, about, describe, write_cell
+from viewbench.common.settings import Tracking
+from viewbench.reports import _tracked_link, _tracking
 from viewbench.workflow import _tracker
 
 STUDY = """scenes: [room_human]
@@ -109,19 +110,21 @@ def test_nothing_is_begun_where_nothing_is_logged(folder):
 def test_a_run_says_where_its_figure_is(tmp_path, capsys):
     results = tmp_path / "results" / "demo"
     results.mkdir(parents=True)
-    for uri in ("", "sqlite:///a.db"):
+    database, server = f"sqlite:///{tmp_path}/a.db", "https://ann:secret@example.org/mlflow/"
+    for uri in ("", database, server):
         _tracker.say_where(str(results), uri)
     assert capsys.readouterr().err == ""
-    address = "https://ann:secret@example.org/mlflow/"
-
-    def logged_to(uri):
-        (results / "tracked.json").write_text(json.dumps({"experiment": "7", "store": _tracked_link.store(uri)}))
-
-    logged_to("sqlite:///a.db")
-    _tracker.say_where(str(results), "sqlite:///a.db")
-    assert "dashboard` runs): http://127.0.0.1:5000/#/experiments/7/runs?" in capsys.readouterr().err
-    logged_to(address)
-    _tracker.say_where(str(results), address)
+    write_cell(results, ROWS[0])
+    done = _tracking.track(about(), ROWS[:1], results, Tracking(uri=database, artifacts=str(tmp_path / "artifacts")))
+    _tracker.say_where(str(results), database)
+    assert (
+        f"dashboard` runs): http://127.0.0.1:5000/#/experiments/{done['experiment']}/runs?" in capsys.readouterr().err
+    )
+    # of a server what was said when the study was logged to it, and to none other
+    (results / "tracked.json").write_text(json.dumps({"experiment": "7", "store": _tracked_link.store(server)}))
+    _tracker.say_where(str(results), "https://other.org")
+    assert capsys.readouterr().err == ""
+    _tracker.say_where(str(results), server)
     said = capsys.readouterr().err
     assert "in MLflow: https://example.org/mlflow/#/experiments/7/runs?" in said
     assert "secret" not in said + (results / "tracked.json").read_text()
@@ -145,22 +148,18 @@ def test_the_dashboard_says_what_is_missing(run_viewbench, tmp_path):
         taken.listen()
         port = str(taken.getsockname()[1])
         assert f"port {port} is taken" in says("--port", port, VIEWBENCH_TRACKING_URI="sqlite:///results/mlflow.db")
+    assert "no study 'nosuch'" in says("nosuch", "--links", VIEWBENCH_TRACKING_URI="sqlite:///results/mlflow.db")
 
 
 def test_the_dashboard_serves_what_was_logged(tmp_path):
     import urllib.request
 
-    from tests.reports.test_tracking import ROWS, about, write_cell
     from viewbench.backends._command_line import free_port
-    from viewbench.common.settings import Tracking
-    from viewbench.reports import _tracking
 
     results = tmp_path / "results" / "demo"
     write_cell(results, ROWS[0])
     uri = f"sqlite:///{tmp_path}/results/mlflow.db"
     done = _tracking.track(about(), ROWS[:1], results, Tracking(uri=uri, artifacts=str(tmp_path / "artifacts")))
-    done |= {"store": "sqlite:///results/mlflow.db"}
-    (results / "tracked.json").write_text(json.dumps(done))
     port = free_port()
     with open(tmp_path / "said.txt", "wb") as said:
         served = subprocess.Popen(

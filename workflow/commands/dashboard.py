@@ -30,22 +30,20 @@ def command(study: str | None, port: int, results: Path, links: bool) -> None:
     found = _tracked_link.figures(results, uri, here)
     if study is not None:
         name = Path(study).stem
-        found = {key: value for key, value in found.items() if key == name}
-    for name, address in found.items():
-        click.echo(f"Figure 4 of {name} in MLflow: {address}")
+        if name not in found:
+            known = f" (there are: {', '.join(found)})" if found else ""
+            raise UserError(f"no study '{name}' has been logged to {masked(uri, uri)}{known}")
+        found = {name: found[name]}
+    remote = _tracking.is_remote(uri)
+    if not links and not remote:
+        _check(uri, port)
+    for name, figure in found.items():
+        click.echo(f"Figure 4 of {name} in MLflow: {figure}")
     if links:
         return
-    if _tracking.is_remote(uri):
+    if remote:
         print(f"viewbench: runs are logged to {masked(uri)}, which serves them itself", file=sys.stderr)
         return
-    if not _is_there(uri):
-        raise UserError(f"there is no database '{masked(uri)}' yet; run a study first")
-    with socket.socket() as tried:
-        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            tried.bind(("127.0.0.1", port))
-        except OSError:
-            raise UserError(f"port {port} is taken, by another dashboard perhaps; name another by --port") from None
     arguments = ["server", "--backend-store-uri", _tracking.local_uri(uri), "--host", "127.0.0.1", "--port", str(port)]
     sys.stdout.flush()
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
@@ -53,8 +51,18 @@ def command(study: str | None, port: int, results: Path, links: bool) -> None:
     os.execv(sys.executable, [sys.executable, "-m", "mlflow", *arguments])
 
 
-def _is_there(uri: str) -> bool:
+def _check(uri: str, port: int) -> None:
+    """Raises UserError where there is nothing to serve, or nowhere to serve it."""
+    from ...common.errors import UserError
     from ...reports import _tracking_sqlite
+    from ...reports._tracking_errors import masked
 
     path = _tracking_sqlite.path_of(uri)
-    return path is None or path.is_file()
+    if path is not None and not path.is_file():
+        raise UserError(f"there is no database '{masked(uri, uri)}' yet; run a study first")
+    with socket.socket() as tried:
+        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            tried.bind(("127.0.0.1", port))
+        except OSError:
+            raise UserError(f"port {port} is taken, by another dashboard perhaps; name another by --port") from None

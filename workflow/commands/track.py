@@ -1,6 +1,7 @@
 """Log a study to MLflow."""
 
 import contextlib
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +17,8 @@ from . import _options
 @click.option("--results", type=click.Path(path_type=Path), default="results", show_default=True)
 @click.option("--only", type=click.Choice(["cells", "page"]), help="The cells and their summaries, or the page.")
 @click.option("--follow", is_flag=True, help="Log cells as they are scored, until this is stopped (Ctrl-C).")
-@click.option("--import", "recording", metavar="FOLDER", type=click.Path(path_type=Path), help="Log a recording.")
+@click.option("--import", "recording", metavar="FOLDER", type=click.Path(path_type=Path), help="Log what is there.")
+@click.option("--as", "name", metavar="NAME", help="Experiment that --import makes; else its name with what it is.")
 @click.option("--stamp", type=click.Path(path_type=Path), help="File to write when done, for the workflow.")
 @click.option("--of-run", is_flag=True, hidden=True, help="With --follow: cells that are stale come in by stdin.")
 def command(
@@ -25,13 +27,15 @@ def command(
     only: str | None,
     follow: bool,
     recording: Path | None,
+    name: str | None,
     stamp: Path | None,
     of_run: bool,
 ) -> None:
     """Log the finished cells of STUDY, and its page: what is new or has changed; a cell never has two runs.
 
-    With --import it is a folder that is logged: one of recorded results (about.json and results.csv), or results/STUDY
-    of another machine.
+    The experiment shows the study as it is now: runs of what has changed are replaced (MLflow keeps them as deleted).
+    With --import a folder is logged instead, into an experiment of its own: recorded results (about.json and
+    results.csv), or results/STUDY of another machine.
     """
     from ...common import settings as settings_file
     from ...common.errors import UserError
@@ -42,13 +46,21 @@ def command(
     settings = settings_file.load()
     asked = settings.tracking
     if recording is not None:
-        _import(recording, study, settings)
+        given = {"STUDY": study, "--only": only, "--follow": follow, "--stamp": stamp}
+        others = [option for option, value in given.items() if value]
+        if others:
+            raise UserError(f"--import does not go with {others[0]}; --as NAME names the experiment")
+        _import(recording, name, settings)
         return
+    if name is not None:
+        raise UserError("--as names what --import makes; an experiment has the name of its study")
     if study is None:
         raise UserError("name a study, or a folder with --import")
     checked = _study.load(study, settings)
     folder, cells = results / checked.name, checked.cells()
-    about = _about.of_study(checked.record(), cells, checked.source.name, settings.place_of)
+    about = _about.of_study(checked.record(), cells, _called(checked), settings.place_of)
+    if not folder.is_dir():
+        raise UserError(f"there is no folder '{folder}': run the study first, or name another one by --results")
     if follow:
         _follow(about, cells, folder, asked, of_run)
         return
@@ -72,6 +84,13 @@ def command(
         _tell(done)
 
 
+def _called(study: Any) -> str:
+    """What `viewbench run` is given to run it."""
+    from .. import _study
+
+    return study.name if study.source.parent == _study.STUDIES else study.source.name
+
+
 def _log(about: Any, cells: list[dict[str, str]], folder: Path, tracking: Any) -> dict[str, Any]:
     """The cells that are sound, and where they are to be seen."""
     from ...reports import _tracked_link, _tracking
@@ -79,7 +98,7 @@ def _log(about: Any, cells: list[dict[str, str]], folder: Path, tracking: Any) -
 
     sound = _collect.without_stale(cells, folder)
     stale = [cell for cell in cells if cell not in sound]
-    with _alone(folder, tracking):
+    with _turn(about, folder, tracking):
         done = _tracking.track(about, sound, folder, tracking, _progress(), _say, stale)
     figure = _tracked_link.address(tracking.uri, str(done["experiment"]))
     return {**done, "store": _tracked_link.store(tracking.uri), "figure": figure}
@@ -88,7 +107,7 @@ def _log(about: Any, cells: list[dict[str, str]], folder: Path, tracking: Any) -
 def _publish(about: Any, folder: Path, tracking: Any) -> dict[str, str]:
     from ...reports import _tracking_page
 
-    with _alone(folder, tracking):
+    with _turn(about, folder, tracking):
         return _tracking_page.publish(about, folder, tracking)
 
 
@@ -102,11 +121,12 @@ def _given_up(folder: Path) -> dict[str, Any]:
     return {"skipped": told["skipped"]} if isinstance(told, dict) and "skipped" in told else {}
 
 
-def _alone(folder: Path, tracking: Any) -> contextlib.AbstractContextManager[None]:
+def _turn(about: Any, folder: Path, tracking: Any) -> contextlib.AbstractContextManager[bool]:
     """While the body runs nobody else on this machine logs the study."""
-    from ...common import holding
+    from ...reports import _tracking_turn
 
-    return holding.alone(folder / "logs" / "track", tracking.patience)
+    patience_s = max(tracking.patience, _tracking_turn.LEAST_S)
+    return _tracking_turn.turn(tracking.uri, about.name, folder, f"process {os.getpid()}", patience_s)
 
 
 def _import(recording: Path, name: str | None, settings: Any) -> None:
@@ -137,6 +157,8 @@ def _tell(done: dict[str, Any]) -> None:
     words += [str(done["skipped"])] if "skipped" in done else []
     words += ["the page"] if "run" in done else []
     click.echo(", ".join(words))
+    if "figure" in done:
+        click.echo(f"Figure 4 in MLflow: {done['figure']}")
 
 
 def _progress() -> Callable[[int, int | None, str], None]:
