@@ -15,7 +15,7 @@ from ._thumbnails import font, shortened
 
 GAIN = 4  # of the difference: at 30 dB it is dark grey, at 20 dB light; always the same, so that runs can be compared
 LARGEST = 640  # pixels of a picture's longer side; a larger one is reduced
-ENLARGED = 384  # and a smaller one enlarged by as many whole times as stay within this
+ENLARGED = 256  # and a smaller one enlarged by as many whole times as stay within this: three fit into MLflow's viewer
 NARROWEST = 480  # pixels of a strip, which has words below it
 GAP, LINE, LETTERS = 6, 20, 13  # pixels between pictures, of a line of words, and of its letters
 INK, GREY, PAPER = "#1F1F1F", "#6A6A6A", "white"

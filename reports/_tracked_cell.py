@@ -22,6 +22,7 @@ from ._about import About
 from ._tracked_run import COLOUR, COMMIT, DIRTY, LONGEST_DIGEST, SOURCE, SOURCE_TYPE, USER, Content, DataSet, params
 
 MB = 10**6
+KEPT = 200  # figures of choices, of some 50 kB each
 LATEST_S = 2.0**37  # of a time, since 1970: databases take its milliseconds
 VERSION = 2  # of how a cell is logged: another one replaces the runs that are there
 
@@ -75,6 +76,7 @@ class StudyCells:
         self._scenes: dict[str, tuple[Any, dict[str, Any]]] = {}  # by name, with what was read when
         self._rooms: dict[str, tuple[Any, Any]] = {}
         self._facts: dict[str, tuple[Any, Facts]] = {}
+        self._drawn: dict[tuple[str, str, str], tuple[Any, bytes]] = {}
 
     def facts(self, cell: Mapping[str, str]) -> Facts:
         """From the cell's records, which are read once."""
@@ -135,6 +137,19 @@ class StudyCells:
             return self._scenes[name][1]
         return {}
 
+    def _cameras(self, cell: Mapping[str, str], selection: dict[str, Any]) -> bytes:
+        """The figure of a choice, which is drawn once for all cells that share it. Raises UserError."""
+        from . import _run_cameras, _run_pictures
+
+        name, room = cell["selector"], self._room(cell["scene"])
+        key = (cell["scene"], name, selection_sha256(selection))
+        if self._drawn.get(key, (None,))[0] is not room:
+            figure = _run_cameras.cameras(room, selection, self.about.colours[name], name)
+            for old in [*self._drawn][: len(self._drawn) - KEPT]:
+                del self._drawn[old]
+            self._drawn[key] = (room, _run_pictures.encoded(figure, _run_pictures.PNG))
+        return self._drawn[key][1]
+
     def _room(self, name: str) -> Any:
         """What all figures of a scene's cameras share. Raises UserError for a description that cannot be drawn."""
         from . import _run_cameras
@@ -157,7 +172,7 @@ class StudyCells:
         self, cell: Mapping[str, str], selection: dict[str, Any], metrics: dict[str, Any], drawn: Path
     ) -> list[tuple[Path, str | None]]:
         """Strips of truth and render, and where the chosen cameras are; what cannot be drawn is left out."""
-        from . import _run_cameras, _run_pictures  # PIL
+        from . import _run_pictures  # PIL
 
         if not self.tracking.renders:
             return []
@@ -170,10 +185,8 @@ class StudyCells:
                 path.write_bytes(_run_pictures.encoded(strip))
                 files.append((path, "renders"))
         with contextlib.suppress(UserError):
-            name = cell["selector"]
-            figure = _run_cameras.cameras(self._room(cell["scene"]), selection, self.about.colours[name], name)
             path = drawn / f"cameras{_run_pictures.PNG}"
-            path.write_bytes(_run_pictures.encoded(figure, _run_pictures.PNG))
+            path.write_bytes(self._cameras(cell, selection))
             files.append((path, None))
         return files
 

@@ -106,7 +106,7 @@ def test_a_view_outside_of_the_cell_is_refused(tmp_path, file):
         pictures.files_of({"name": "a", "file": file}, tmp_path, tmp_path)
 
 
-@pytest.mark.parametrize(("height", "width", "times"), [(64, 64, 6), (30, 100, 3), (128, 128, 3), (200, 400, 1)])
+@pytest.mark.parametrize(("height", "width", "times"), [(64, 64, 4), (30, 100, 2), (128, 128, 2), (200, 400, 1)])
 def test_a_strip_shows_the_pixels_that_were_scored_and_how_far_they_are_apart(tmp_path, height, width, times):
     truth, drawn = noise(height, width), noise(height, width, 1) // 8 + noise(height, width) // 8 * 7
     name = picture_name(3, "test/0003.png")
@@ -119,7 +119,7 @@ def test_a_strip_shows_the_pixels_that_were_scored_and_how_far_they_are_apart(tm
 
 def test_equal_pictures_differ_nowhere(tmp_path):
     same = saved(tmp_path / "a.png", noise(64, 48))
-    assert not panels(pictures.strip(same, same, ""), (6 * 48, 6 * 64))[2].any()
+    assert not panels(pictures.strip(same, same, ""), (4 * 48, 4 * 64))[2].any()
 
 
 def test_a_large_strip_is_bounded_in_pixels_and_bytes_and_keeps_means(tmp_path):
@@ -155,6 +155,7 @@ def test_a_strip_of_any_shape_is_within_its_bounds(tmp_path, width, height):
 
 def test_without_a_truth_to_compare_with_the_render_stands_alone_and_says_why(tmp_path):
     drawn = noise(64, 96)
+    assert pictures.ENLARGED // 96 == 2
     render = saved(tmp_path / "a.png", drawn)
     text, cut = tmp_path / "text.png", tmp_path / "cut.png"
     text.write_text("no picture")
@@ -166,9 +167,9 @@ def test_without_a_truth_to_compare_with_the_render_stands_alone_and_says_why(tm
     for truth in (None, tmp_path / "missing.png", text, cut, tmp_path, huge, other):
         image = pictures.strip(render, truth, "words")
         assert image.width == pictures.NARROWEST
-        (panel,) = panels(image, (384, 256), 1)
-        np.testing.assert_array_equal(panel, drawn.repeat(4, axis=0).repeat(4, axis=1))
-        label = np.asarray(image)[256 : 256 + pictures.LINE]
+        (panel,) = panels(image, (192, 128), 1)
+        np.testing.assert_array_equal(panel, drawn.repeat(2, axis=0).repeat(2, axis=1))
+        label = np.asarray(image)[128 : 128 + pictures.LINE]
         assert (label < 200).any(axis=-1).sum() > 100, "there are words below it"
         whys.setdefault(pictures._compared(truth, (96, 64))[1], label)
     assert [re.sub(r"\d+", "N", why) for why in whys] == [
@@ -187,7 +188,7 @@ def test_a_truth_of_another_size_is_brought_to_the_renders(tmp_path):
         with Image.open(render) as image:
             image.resize((size, size), Image.Resampling.BOX).save(tmp_path / "b.png")
         image = pictures.strip(render, tmp_path / "b.png", "")
-        assert panels(image, (384, 384))[2].mean() < 4 * 2
+        assert panels(image, (256, 256))[2].mean() < 4 * 2
         assert f"{size} x {size}" in pictures._compared(tmp_path / "b.png", (128, 128))[1]
 
 
@@ -223,7 +224,7 @@ def test_words_of_any_letters_and_length_fit(tmp_path_factory, words):
     plain = np.asarray(pictures.strip(path, None, ""))
     image = np.asarray(pictures.strip(path, None, words))
     assert image.shape == plain.shape
-    np.testing.assert_array_equal(image[: 384 + pictures.LINE // 2], plain[: 384 + pictures.LINE // 2])
+    np.testing.assert_array_equal(image[: 256 + pictures.LINE // 2], plain[: 256 + pictures.LINE // 2])
 
 
 def test_the_same_files_give_the_same_bytes(study, room, tmp_path):

@@ -1,5 +1,6 @@
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -482,3 +483,21 @@ def test_names_that_mlflow_does_not_take_are_written_otherwise(store):
     track(results, tracking, [row], about(rows=[row]))
     client, (run,) = runs_of(tracking, "summary")
     assert history(client, run, "psnr_db/küche_ _alt_") == [(10, 20.0)]
+
+
+def test_the_figure_of_a_choice_is_drawn_once_and_anew_for_another_choice_or_scene(store, monkeypatch):
+    from viewbench.reports import _run_cameras
+
+    results, tracking = store
+    describe(results)
+    drawn, cameras = [], _run_cameras.cameras
+    monkeypatch.setattr(_run_cameras, "cameras", lambda *given: drawn.append(given) or cameras(*given))
+    track(results, tracking)
+    assert len(drawn) == 2  # by selector: both seeds have one choice
+    path = results.joinpath("cells", *ROWS[1].values(), "selection.json")
+    path.write_text(json.dumps({**json.loads(path.read_text()), "indices": [1, 2, 3, 4]}))
+    track(results, tracking)
+    client, runs = runs_of(tracking)
+    assert len(drawn) == 3
+    figures = {Path(client.download_artifacts(run.info.run_id, "cameras.png")).read_bytes() for run in runs}
+    assert len(figures) == 3
