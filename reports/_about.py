@@ -24,6 +24,7 @@ class About:
     selectors: tuple[str, ...]  # in the order of the study, without the full-data reference
     grid: tuple[Mapping[str, str], ...]  # all cells, by common.cells.AXES
     places: Mapping[str, str] = field(default_factory=dict)  # where scenes lie, as settings write it
+    ours: bool = True  # whether who logs it made it
 
     @cached_property
     def backends(self) -> list[str]:

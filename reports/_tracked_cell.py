@@ -229,7 +229,7 @@ def common_tags(about: About, selector: str, commit: str) -> dict[str, str]:
     """Tags of MLflow's own that a cell and a summary have: who, from what, in which colour."""
     tags = {
         COLOUR: about.colours.get(selector, ""),
-        USER: user(),
+        USER: user() if about.ours else "",
         SOURCE: about.source,
         SOURCE_TYPE: "LOCAL",
         COMMIT: commit.removesuffix("-dirty"),

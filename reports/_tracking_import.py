@@ -111,7 +111,7 @@ def _study_folder(folder: Path, name: str | None, tracking: Tracking) -> tuple[_
     about = _about.of_study(
         {**study.record, "name": name or f"{study.name}, imported"}, map(_axes, study.cells), study.name
     )
-    about = replace(about, source=f"viewbench track --import {folder}")
+    about = replace(about, source=f"viewbench track --import {folder}", ours=False)
     return about, [_axes(cell) for cell in study.done], StudyCells(about, folder, tracking)
 
 
@@ -136,6 +136,7 @@ def _recording(folder: Path, name: str | None) -> tuple[_about.About, list, Cell
         source=f"viewbench track --import {folder}",
         selectors=tuple(in_order(cell["selector"] for cell in grid if cell["selector"] != FULL)),
         grid=tuple(grid),
+        ours=False,
     )
     return about, grid, TableCells(about, cells, _recorded_ms(folder), machine)
 

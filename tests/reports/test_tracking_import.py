@@ -1,5 +1,7 @@
+import getpass
 import json
 import shutil
+from datetime import datetime
 
 import pytest
 
@@ -60,6 +62,10 @@ def test_a_recording_is_an_experiment_with_its_means(tracking, tmp_path):
             ]
             assert value == pytest.approx(sum(map(known, here)) / len(here))
     assert any(run.data.params["selector"] == FULL for run in summaries)
+    # of when it was made, and by nobody here
+    made = 1000 * datetime.fromisoformat(json.loads((QUICK / "about.json").read_text())["date"]).timestamp()
+    assert {run.info.end_time for run in cells} == {round(made)}
+    assert all(run.data.tags.get("mlflow.user") != getpass.getuser() for run in cells)
     # once more, and after somebody has touched the files: nothing is new
     (small / "results.csv").touch()
     assert bring(small, tracking)["kept"] == len(some)

@@ -261,6 +261,7 @@ def test_a_study_can_be_recorded(clone, tmp_path):
     assert about["notes"] == "by a test"
     assert about["machine"]["cpus"] >= 1
     assert about["versions"]["numba"]
+    assert about["date"].endswith("+00:00")
 
 
 def test_a_wrong_study_is_one_sentence(clone):

@@ -22,6 +22,7 @@ def command(folder: Path, name: str | None, into: Path | None, commands: tuple[s
 
     from ...common.errors import UserError
     from ...common.files import read_json, whole_folder, write_json
+    from ...common.provenance import now
     from ...common.settings import PACKAGE
 
     clone = (PACKAGE / "pyproject.toml").is_file()
@@ -36,6 +37,7 @@ def command(folder: Path, name: str | None, into: Path | None, commands: tuple[s
     made_by = f"snakemake -j2 --config study={study['name']} -- reports" if clone else f"viewbench run {study['name']}"
     about = {
         "title": study["title"],
+        "date": max(record.get("began") or "" for record in records) or now(),
         "machine": dict(machines.pop()) if len(machines) == 1 else {"several": len(machines)},
         "versions": {name: metadata.version(name) for name in VERSIONS if importlib.util.find_spec(name)},
         "backends": sorted({f"{record['backend']} {record['version']}" for record in records}),
