@@ -184,7 +184,7 @@ def test_a_terminal_gets_one_line_and_a_file_gets_few(clock):
         for number in range(1, 7):
             clock.now += 3
             run_cell(bar, number)
-        begin(bar, 1, "page")
+        begin(bar, 1, "publish")
         end(bar, 1)
         bar.tick()
         bar.tick()

@@ -24,9 +24,12 @@ reference: false
 """
 # A run as far as the tracker knows it, which says the number of the process that it has begun.
 RUN = """
+import signal
 import sys
 from pathlib import Path
 from viewbench.workflow import _tracker
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which is ignored in what a script runs in the background
 
 class Job:
     def __init__(self, rule, **axes):
@@ -94,7 +97,7 @@ def test_it_ends_with_its_run(folder, how):
     if how == "it ends":
         known(run.stdin).write("\n")
         known(run.stdin).flush()
-    run.wait()
+    run.wait(60)
     until(lambda: followers(folder) == [])
     said = (folder / "results" / "demo" / "logs" / "track" / "follow.log").read_text()
     assert said == ""
