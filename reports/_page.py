@@ -10,11 +10,11 @@ from typing import Any
 from .. import __version__
 from ..common import plugins
 from ..common.errors import UserError
-from ..common.files import read_json, write_text
+from ..common.files import write_text
 from ..common.provenance import machine
-from . import _findings, _items, _rooms, _study
+from . import _findings, _items, _rooms, _study, _tracking_stamp
 from ._items import Item
-from ._study import OK, Study, and_list, counted, in_order, missing_words, percent, selector_words
+from ._study import OK, Study, and_list, counted, in_order, machine_words, missing_words, percent, selector_words
 
 TEMPLATES = Path(__file__).parent / "templates"
 HEAVY_BYTES = 300_000  # a larger PNG goes into the page as WebP; the PNG itself stays beside the page
@@ -55,7 +55,7 @@ def build(study_dir: Path) -> Path:
         details=[_tied(sentence) for sentence in _findings.details(study)],
         grid=_grid_words(study),
         facts=_facts(study),
-        dashboard=_stamp(study.folder).get("figure", ""),
+        dashboard=_tracking_stamp.newest(study.folder).get("figure", ""),
         sections=sections,
         failures=_failures(study),
         style=(TEMPLATES / "page.css").read_text(encoding="utf-8"),
@@ -108,7 +108,6 @@ def _failures(study: Study) -> list[tuple[str, list[str]]]:
 def _facts(study: Study) -> list[tuple[str, str]]:
     """What was run, where and when, as (what, value) pairs; what no file says is left out."""
     trains = [cell.read("train") for cell in study.done]
-    here = machine()
     devices = in_order(f"{train['device']}, {counted(train['threads'], 'thread')} per job" for train in trains)
     facts = [
         ("Scenes", and_list(_scene_words(study, scene) for scene in study.scenes)),
@@ -128,7 +127,7 @@ def _facts(study: Study) -> list[tuple[str, str]]:
             f"{len(study.done)} of {len(study.cells)} scored" + (f", {missing_words(study)}" if study.failed else ""),
         ),
         ("Trained on", "; ".join(devices)),
-        ("Page made on", f"{here['cpu']}, {here['cpus']} CPUs, {here['system']}, Python {here['python']}"),
+        ("Page made on", machine_words(machine())),
         ("viewbench", and_list(in_order(cell.viewbench for cell in study.done)) or __version__),
         ("Commit", and_list(in_order(cell.commit for cell in study.done if cell.commit))),
         ("Tracking", _tracking_words(study.folder)),
@@ -139,17 +138,8 @@ def _facts(study: Study) -> list[tuple[str, str]]:
 
 def _tracking_words(folder: Path) -> str:
     """Why the cells were not logged, where they were not; the next run tries again."""
-    skipped = _stamp(folder).get("skipped", "")
+    skipped = _tracking_stamp.newest(folder).get("skipped", "")
     return f"not logged: {skipped}" if skipped else ""
-
-
-def _stamp(folder: Path) -> dict[str, Any]:
-    """What logging the cells left; empty where they were not offered."""
-    stamps = [path for name in ("tracked", "tracked.partial") if (path := folder / f"{name}.json").is_file()]
-    if not stamps:
-        return {}
-    record = read_json(max(stamps, key=lambda path: path.stat().st_mtime_ns), "stamp of tracking")
-    return record if isinstance(record, dict) else {}
 
 
 def _grid_words(study: Study) -> str:

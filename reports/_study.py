@@ -251,6 +251,16 @@ def selector_words(entry: dict[str, Any]) -> str:
     return f"{entry['name']} ({', '.join(parts)})" if parts else entry["name"]
 
 
+def machine_words(record: Any) -> str:
+    """A machine as `common.provenance` records it, for people: "AMD EPYC, 2 CPUs, Linux x86_64, Python 3.11.7"; empty
+    for what is no record of one."""
+    if not isinstance(record, dict):
+        return ""
+    parts = [record.get("cpu"), f"{record['cpus']} CPUs" if "cpus" in record else None, record.get("system")]
+    parts.append(f"Python {record['python']}" if "python" in record else None)
+    return ", ".join(str(part) for part in parts if part)
+
+
 def failures_note(study: Study) -> str:
     """A sentence for captions when cells are missing; empty otherwise."""
     return f" Left out of {len(study.cells)} cells: {missing_words(study)}." if study.failed else ""

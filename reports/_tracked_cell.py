@@ -7,7 +7,7 @@ import contextlib
 import getpass
 import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -19,11 +19,25 @@ from ..common.files import read_json, sha256_file
 from ..common.settings import Tracking
 from ..selectors._selection import selection_sha256
 from ._about import About
-from ._tracked_run import COLOUR, COMMIT, DIRTY, LONGEST_DIGEST, SOURCE, SOURCE_TYPE, USER, Content, DataSet, params
+from ._study import machine_words
+from ._tracked_run import (
+    COLOUR,
+    COMMIT,
+    DIRTY,
+    LONGEST_DIGEST,
+    SHARE,
+    SOURCE,
+    SOURCE_TYPE,
+    USER,
+    Content,
+    DataSet,
+    params,
+)
 
 MB = 10**6
 KEPT = 200  # figures of choices, of some 50 kB each
 LATEST_S = 2.0**37  # of a time, since 1970: databases take its milliseconds
+Made = tuple[Any, Any]  # the stamp of what it was made of, and what was made
 VERSION = 2  # of how a cell is logged: another one replaces the runs that are there
 
 
@@ -73,19 +87,19 @@ class StudyCells:
 
     def __init__(self, about: About, results: Path, tracking: Tracking):
         self.about, self.results, self.tracking = about, results, tracking
-        self._scenes: dict[str, tuple[Any, dict[str, Any]]] = {}  # by name, with what was read when
-        self._rooms: dict[str, tuple[Any, Any]] = {}
-        self._facts: dict[str, tuple[Any, Facts]] = {}
-        self._drawn: dict[tuple[str, str, str], tuple[Any, bytes]] = {}
+        # What was made of files, with the stamps that these had (`_made_of`): scenes, what their figures share, cells,
+        # and figures of choices.
+        self._scenes: dict[str, Made] = {}
+        self._rooms: dict[str, Made] = {}
+        self._facts: dict[str, Made] = {}
+        self._drawn: dict[tuple[str, str, str], Made] = {}
 
     def facts(self, cell: Mapping[str, str]) -> Facts:
         """From the cell's records, which are read once."""
         folder, name = cell_folder(self.results, cell), cell_name(cell)
         with _explained(cell):
             stamps = [_stamp(folder / file) for file in RECORDS]
-            if self._facts.get(name, (None,))[0] != stamps:
-                self._facts[name] = (stamps, _facts(cell, folder, *read_records(folder)))
-            return self._facts[name][1]
+            return _made_of(stamps, self._facts, name, lambda: _facts(cell, folder, *read_records(folder)))
 
     def fingerprint(self, cell: Mapping[str, str]) -> str:
         """The hash of its records, of what the run is called, and of which files it gets."""
@@ -128,36 +142,35 @@ class StudyCells:
 
     def scene(self, name: str) -> dict[str, Any]:
         """As `viewbench describe` wrote it; read again when that has written another one."""
-        path = self.results / "scenes" / f"{name}.json"
+        path = self._described(name)
+
+        def read() -> dict[str, Any]:
+            record = read_json(path, "scene description")
+            return record if isinstance(record, dict) else {}
+
         with contextlib.suppress(UserError, RecursionError, OSError):
-            stamp = _stamp(path)
-            if self._scenes.get(name, (None, {}))[0] != stamp:
-                record = read_json(path, "scene description")
-                self._scenes[name] = (stamp, record if isinstance(record, dict) else {})
-            return self._scenes[name][1]
+            return _made_of(_stamp(path), self._scenes, name, read)
         return {}
 
+    def _described(self, scene: str) -> Path:
+        return self.results / "scenes" / f"{scene}.json"
+
     def _cameras(self, cell: Mapping[str, str], selection: dict[str, Any]) -> bytes:
-        """The figure of a choice, which is drawn once for all cells that share it. Raises UserError."""
+        """The figure of a choice, which is drawn once for all cells that share it. Raises UserError, and OSError where
+        the scene is not described."""
         from . import _run_cameras, _run_pictures
 
-        name, room = cell["selector"], self._room(cell["scene"])
-        key = (cell["scene"], name, selection_sha256(selection))
-        if self._drawn.get(key, (None,))[0] is not room:
+        scene, name = cell["scene"], cell["selector"]
+        stamp = _stamp(self._described(scene))
+
+        def draw() -> bytes:
+            room = _made_of(stamp, self._rooms, scene, lambda: _run_cameras.room_of(self.scene(scene)))
             figure = _run_cameras.cameras(room, selection, self.about.colours[name], name)
-            for old in [*self._drawn][: len(self._drawn) - KEPT]:
-                del self._drawn[old]
-            self._drawn[key] = (room, _run_pictures.encoded(figure, _run_pictures.PNG))
-        return self._drawn[key][1]
+            return _run_pictures.encoded(figure, _run_pictures.PNG)
 
-    def _room(self, name: str) -> Any:
-        """What all figures of a scene's cameras share. Raises UserError for a description that cannot be drawn."""
-        from . import _run_cameras
-
-        record = self.scene(name)
-        if self._rooms.get(name, (None,))[0] is not record:
-            self._rooms[name] = (record, _run_cameras.room_of(record))
-        return self._rooms[name][1]
+        for old in [*self._drawn][: len(self._drawn) - KEPT]:
+            del self._drawn[old]
+        return _made_of(stamp, self._drawn, (scene, name, selection_sha256(selection)), draw)
 
     def coherent(self, cell: Mapping[str, str]) -> bool:
         """Whether the score is of the model, and the model of the choice, that lie beside it: none is made anew."""
@@ -184,7 +197,7 @@ class StudyCells:
                 path = drawn / f"{render.stem}{_run_pictures.JPEG}"
                 path.write_bytes(_run_pictures.encoded(strip))
                 files.append((path, "renders"))
-        with contextlib.suppress(UserError):
+        with contextlib.suppress(UserError, FileNotFoundError):
             path = drawn / f"cameras{_run_pictures.PNG}"
             path.write_bytes(self._cameras(cell, selection))
             files.append((path, None))
@@ -202,7 +215,7 @@ def content(
 ) -> Content:
     """The run of a cell."""
     cell = facts.cell
-    final = {**facts.figures, "ratio_percent": 100 * float(cell["ratio"])}
+    final = {**facts.figures, SHARE: 100 * float(cell["ratio"])}
     return Content(
         kind="cell",
         key=cell_name(cell),
@@ -291,7 +304,7 @@ def _facts(
             "backend": str(train.get("backend", cell["backend"])),
             "backend_version": str(train["version"]),
             "device": str(train["device"]),
-            "machine": _machine(train.get("machine")),
+            "machine": machine_words(train.get("machine")),
             "viewbench": str(train.get("viewbench", "")),
         },
         commit=str(train["commit"] or ""),
@@ -300,15 +313,6 @@ def _facts(
         trained_ms=trained_ms,
         ended_ms=ended_ms,
     )
-
-
-def _machine(record: Any) -> str:
-    """ "AMD EPYC, 2 CPUs, Linux x86_64, Python 3.11.7"."""
-    if not isinstance(record, dict):
-        return ""
-    parts = [record.get("cpu"), f"{record['cpus']} CPUs" if "cpus" in record else None, record.get("system")]
-    parts.append(f"Python {record['python']}" if "python" in record else None)
-    return ", ".join(str(part) for part in parts if part)
 
 
 @contextlib.contextmanager
@@ -320,6 +324,13 @@ def _explained(cell: Mapping[str, str]) -> Iterator[None]:
         raise UserError(f"cell {cell_name(cell)} cannot be read: {error.strerror}: {error.filename}") from None
     except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
         raise UserError(f"the files of cell {cell_name(cell)} are not as viewbench writes them ({error!r})") from None
+
+
+def _made_of(stamp: Any, kept: dict[Any, Made], key: Any, make: Callable[[], Any]) -> Any:
+    """What `make` returned when the files that it reads had this stamp; it is called where they have another."""
+    if key not in kept or kept[key][0] != stamp:
+        kept[key] = (stamp, make())
+    return kept[key][1]
 
 
 def _stamp(path: Path) -> tuple[int, int]:

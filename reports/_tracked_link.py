@@ -9,10 +9,10 @@ from ..common.files import read_json
 from . import _tracked_view, _tracking_sqlite
 from ._tracking_errors import masked
 from ._tracking_log import is_remote
+from ._tracking_stamp import FOLLOWED, STAMPS, newest_first
 
 PORT = 5000
 HERE = f"http://127.0.0.1:{PORT}"
-STAMPS = ("tracked.json", "tracked.partial.json", "logs/track/follow.json")  # the last of a run that goes on
 
 
 def address(uri: str, experiment: str, here: str = HERE) -> str:
@@ -58,8 +58,7 @@ def _in_database(path: Path) -> dict[str, str]:
 
 def _experiment(results: Path, uri: str) -> str:
     """The id of a study's experiment, as the last that logged it to this store has said; empty where none has."""
-    stamps = [path for name in STAMPS if (path := results / name).is_file()]
-    for path in sorted(stamps, key=lambda path: path.stat().st_mtime_ns, reverse=True):
+    for path in newest_first(results, *STAMPS, FOLLOWED):
         with contextlib.suppress(UserError, AttributeError):
             told = read_json(path)
             found = told.get("experiment")

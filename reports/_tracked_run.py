@@ -12,6 +12,7 @@ KIND = "viewbench.kind"  # one of the three below
 CELL, SUMMARY, REPORT = "viewbench.cell", "viewbench.summary", "viewbench.report"  # tags with a name, by kind
 KINDS = {"cell": CELL, "summary": SUMMARY, "report": REPORT}
 FINGERPRINT, WRITER, BEGUN = "viewbench.fingerprint", "viewbench.writer", "viewbench.begun"
+SHARE = "ratio_percent"  # metric of the share of views: 0.5 % has no step of its own
 POINT = "viewbench.point."  # and a ratio: what tells the point of a summary from another one
 # MLflow's own tags (mlflow/utils/mlflow_tags.py, and constants.ts of its page for the colour).
 PARENT, COLOUR, USER = "mlflow.parentRunId", "mlflow.runColor", "mlflow.user"
@@ -55,7 +56,6 @@ class Content:
     files: Sequence[tuple[Path, str | None]] = ()
     linked: Sequence[tuple[Path, str | None]] = ()
     data: DataSet | None = None
-    of_data: str = "train"  # what the run did with it
     also: dict[str, str] = field(default_factory=dict)  # tags that are set with the rest, and are no part of the hash
 
     def fingerprint(self, *more: object) -> str:
@@ -91,7 +91,7 @@ def write(client: Any, experiment: str, told: Content, tags: dict[str, str], mad
             params=[Param(key, value) for key, value in told.params.items()],
         )
     if told.data:
-        datasets = [_input(told.data, told.of_data)]
+        datasets = [_input(told.data)]
         try:
             client.log_inputs(run.run_id, datasets=datasets)
         except MlflowException:  # of two who bring one that is not there only one succeeds
@@ -121,7 +121,7 @@ def _link(store: Any, path: Path, where: str | None) -> bool:
     return True
 
 
-def _input(data: DataSet, context: str) -> Any:
+def _input(data: DataSet) -> Any:
     from mlflow.entities import Dataset, DatasetInput, InputTag
 
     given = Dataset(
@@ -131,4 +131,4 @@ def _input(data: DataSet, context: str) -> Any:
         source=json.dumps({"uri": data.place}),
         profile=json.dumps(data.profile),
     )
-    return DatasetInput(given, [InputTag("mlflow.data.context", context)])
+    return DatasetInput(given, [InputTag("mlflow.data.context", "train")])

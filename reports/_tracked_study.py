@@ -15,7 +15,6 @@ from ._tracked_summary import PANELS, Group, group_of, key_of
 from ._tracking_log import TRIES, Key, Log
 
 NOTE = "mlflow.note.content"
-ML = "workflowType=machine_learning"  # or a new browser shows the page of an app for language models
 KIND_OF_EXPERIMENT = "custom_model_development"  # in MLflow's words; without it the page is one for language models
 
 
@@ -125,6 +124,6 @@ def note(about: About, experiment: str, verdict: Sequence[str] = (), page: str =
     MLflow shows the first line alone until one asks for the rest. `page` is the id of the run that has the page.
     """
     links = [f"[Figure 4]({_tracked_view.link('', experiment)})"]
-    links += [f"[the page](#/experiments/{experiment}/runs/{page}/artifacts/index.html?{ML})"] if page else []
+    links += [f"[the page]({_tracked_view.run_link('', experiment, page, '/artifacts/index.html')})"] if page else []
     parts = [" · ".join([about.title, *links]), " ".join(verdict), about.description]
     return "\n\n".join(part for part in parts if part)

@@ -12,7 +12,7 @@ from typing import Any
 from ._about import About
 from ._study import FULL
 from ._tracked_cell import VERSION, Facts, common_tags, data_set
-from ._tracked_run import Content, Number, params
+from ._tracked_run import SHARE, Content, Number, params
 
 Group = tuple[str, str, str]  # backend, scene, selector
 MEANS = ("psnr_db", "ssim", "lpips", "select_s", "train_s", "evaluate_s", "n_primitives")
@@ -74,7 +74,7 @@ def points(group: Group, about: About, cells: Iterable[Facts]) -> dict[str, list
         values, stamp = _values(here), max(cell.ended_ms for cell in here)
         numbers = [(key, value, stamp, about.step(ratio)) for key, value in values.items()]
         drawn = [ratio, *(about.ratios_of(backend, scene) if selector == FULL else ())]
-        numbers += [("ratio_percent", 100 * float(at), stamp, about.step(at)) for at in drawn]
+        numbers += [(SHARE, 100 * float(at), stamp, about.step(at)) for at in drawn]
         for key in PANELS:
             if key in values:
                 panel = about.panel(backend, scene, key)

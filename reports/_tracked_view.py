@@ -16,11 +16,12 @@ import zlib
 from collections.abc import Sequence
 from typing import Any
 
+from ._tracked_run import KIND, SHARE
+
 KEY = "viewbench"  # names the view in the link
 PREFIX = "mlflow.sharedViewState."
 LONGEST = 5000  # letters of an experiment's tag in MLflow 3.13; 3.17 takes 20000
-KIND, SUMMARY = "viewbench.kind", "summary"  # tag of the runs that the view shows, and its value
-X = "ratio_percent"  # the metric on the x axis: a ratio such as 0.5 % has no step of its own
+TRAINING = "workflowType=machine_learning"  # without it, a new browser gets the page for language models
 FIGURE, FURTHER = "Figure 4: PSNR over the share of training views", "Further figures over the share of training views"
 OTHERS = "Model metrics"  # the section where the page puts a chart of every metric that has none
 FURTHER_METRICS = ("ssim", "train_s")
@@ -56,16 +57,22 @@ def link(server: str, experiment_id: str) -> str:
 
     It must not name a filter or an order: the page would take those for the reader's own, and not read the tag.
     """
-    query = urllib.parse.urlencode(
-        {"viewStateShareKey": KEY, "compareRunsMode": "CHART", "workflowType": "machine_learning"}
-    )
-    return f"{runs_link(server, experiment_id).partition('?')[0]}?{query}"
+    return f"{_runs(server, experiment_id)}?viewStateShareKey={KEY}&compareRunsMode=CHART&{TRAINING}"
 
 
 def runs_link(server: str, experiment_id: str) -> str:
-    """Address of the table of runs: without the part of it, a new browser gets the page for language models."""
+    """Address of the table of runs."""
+    return f"{_runs(server, experiment_id)}?{TRAINING}"
+
+
+def run_link(server: str, experiment_id: str, run: str, rest: str = "") -> str:
+    """Address of a run, or with `rest` of what is below its page: "/artifacts/index.html"."""
+    return f"{_runs(server, experiment_id)}/{run}{rest}?{TRAINING}"
+
+
+def _runs(server: str, experiment_id: str) -> str:
     base = f"{server.rstrip('/')}/" if server else ""
-    return f"{base}#/experiments/{urllib.parse.quote(experiment_id, safe='')}/runs?workflowType=machine_learning"
+    return f"{base}#/experiments/{urllib.parse.quote(experiment_id, safe='')}/runs"
 
 
 def _state(panels: list[str], further: list[str]) -> dict[str, Any]:
@@ -73,7 +80,7 @@ def _state(panels: list[str], further: list[str]) -> dict[str, Any]:
     charts += [_chart(metric, FURTHER) for metric in further if metric not in panels]
     columns = 2 if len(panels) in (1, 2, 4) else 3
     return {
-        "searchFilter": f"tags.`{KIND}` = '{SUMMARY}'",
+        "searchFilter": f"tags.`{KIND}` = 'summary'",
         # A page has the first 100 runs until one asks for more: so ordered, its panels have all of their lines.
         "orderByKey": "params.`scene`",
         "orderByAsc": True,
@@ -101,7 +108,7 @@ def _state(panels: list[str], further: list[str]) -> dict[str, Any]:
         "autoRefreshEnabled": True,
         "useGroupedValuesInCharts": True,
         "hideEmptyCharts": True,
-        "globalLineChartConfig": {"xAxisKey": "metric", "lineSmoothness": 0, "selectedXAxisMetricKey": X},
+        "globalLineChartConfig": {"xAxisKey": "metric", "lineSmoothness": 0, "selectedXAxisMetricKey": SHARE},
         "chartsSearchFilter": "",
     }
 
@@ -132,7 +139,7 @@ def _chart(metric: str, section: str) -> dict[str, Any]:
         "xAxisScaleType": "linear",
         "scaleType": "linear",
         "xAxisKey": "metric",
-        "selectedXAxisMetricKey": X,
+        "selectedXAxisMetricKey": SHARE,
         "displayPoints": True,
         "useGlobalXaxisKey": False,
         "useGlobalLineSmoothing": False,

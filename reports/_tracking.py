@@ -25,12 +25,11 @@ from ._tracked_cell import Cells, StudyCells
 from ._tracked_run import CELL, FINGERPRINT
 from ._tracked_study import Tracked
 from ._tracked_summary import by_group, key_of
-from ._tracking_errors import Kind, masked
+from ._tracking_errors import NO_TRACKING, Kind, masked
 from ._tracking_log import Log, is_remote
 
 __all__ = ["CELL", "FINGERPRINT", "KEY", "NO_TRACKING", "is_remote", "local_uri", "track"]
 KEY = AXES
-NO_TRACKING = "tracking.uri is empty"  # why nothing is logged where nobody wants it
 STRIKES = 5  # tries of a cell that a server in trouble does not take, while it answers otherwise
 DOUBTED = 4  # times that a refused user asks again: MLflow's server says 401, too, where its database is in trouble
 PAUSES_S = (1, 2, 4, 8, 15)  # between asking a store that is away; the last one again and again
@@ -71,7 +70,6 @@ def put(
     tracking: Tracking,
     progress: Progress = lambda done, total, text: None,
     say: Callable[[str], None] = lambda text: None,
-    verdict: Sequence[str] = (),
     stale: Sequence[Mapping[str, str]] | None = None,
     place: str = "",
 ) -> dict[str, int | str]:
@@ -83,7 +81,7 @@ def put(
         patience = _Patience(tracking, say)
         patience.ask(log.start)
         tracked = Tracked(about, source, log)
-        patience.ask(lambda: tracked.describe(verdict))
+        patience.ask(tracked.describe)
 
         def offer(name: str, what: Callable[[], T]) -> T | None:
             try:
@@ -143,10 +141,15 @@ def local_uri(uri: str) -> str:
     return f"{_tracking_sqlite.PREFIX}{path}"
 
 
-def open_log(study: str, tracking: Tracking, retries: int, wait_s: float, place: str = "") -> Log:
-    """The log of a study, without a request; waits so long for a file that is locked."""
+def keep_quiet() -> None:
+    """MLflow calls nobody at home, here and in programs that this process begins, unless its variables say so."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("DO_NOT_TRACK", "true")
+
+
+def open_log(study: str, tracking: Tracking, retries: int, wait_s: float, place: str = "") -> Log:
+    """The log of a study, without a request; waits so long for a file that is locked."""
+    keep_quiet()
     os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", str(retries))
     os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", str(TIMEOUT_S))
     os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")

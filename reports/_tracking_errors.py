@@ -8,6 +8,7 @@ from urllib.parse import unquote
 
 from ..common.errors import UserError
 
+NO_TRACKING = "tracking.uri is empty"  # why nothing is logged where nobody wants it
 SECRETS = ("MLFLOW_TRACKING_PASSWORD", "MLFLOW_TRACKING_TOKEN")
 SHORTEST = 4  # letters of a secret that is looked for in texts; a shorter one would take words apart
 LONGEST = 300  # letters of MLflow's own words

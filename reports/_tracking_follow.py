@@ -22,6 +22,7 @@ from ._tracked_cell import StudyCells
 from ._tracked_study import Tracked
 from ._tracked_summary import Group, by_group, group_of
 from ._tracking import Progress, explained, open_log
+from ._tracking_stamp import FOLLOWED
 
 LOOK_S = 3.0  # between two looks
 SETTLE_S = 6.0  # from when a score is seen to when it is logged, so that a study of seconds need not import MLflow
@@ -85,10 +86,10 @@ class Follower:
 
     def log(self, names: Sequence[str], stopped: Callable[[], bool] = lambda: False) -> None:
         """Logs these cells, and the points of summaries that are complete now; raises nothing that goes wrong."""
-        asked = self.tracking.uri, self.about.name, self.results, self.me, 0.0
         with contextlib.ExitStack() as held:
             try:  # what another does is not waited for
-                mine = held.enter_context(turns.turn(*asked))
+                turn = turns.turn(self.tracking, self.about.name, self.results, self.me, waits=False)
+                mine = held.enter_context(turn)
             except (UserError, OSError):
                 self.again = self.clock() + AWAY_S
                 return
@@ -182,7 +183,7 @@ class Follower:
         """What this process has cost so far, for who wants to know."""
         with contextlib.suppress(OSError):
             write_json(
-                self.results / "logs" / "track" / "follow.json",
+                self.results / FOLLOWED,
                 {
                     "experiment": self.experiment,
                     "store": _tracked_link.store(self.tracking.uri),

@@ -97,8 +97,7 @@ def bring(
         )
     if not NAME.fullmatch(about.name):
         raise UserError(f"{about.name[:60]!r} is no name of an experiment: letters, digits, spaces and . , _ - ( )")
-    patience_s = max(tracking.patience, turns.LEAST_S)
-    with turns.turn(tracking.uri, about.name, None, f"import {os.getpid()}", patience_s):
+    with turns.turn(tracking, about.name, None, f"import {os.getpid()}"):
         done = _tracking.put(about, cells, source, tracking, progress, say, place=turns.place(folder))
         page = folder / "reports" / "index.html"
         if isinstance(source, StudyCells) and page.is_file() and not page.is_symlink():

@@ -130,7 +130,7 @@ class Study:
 
     def page(self, run: str, rest: str = "") -> str:
         """Address of a run's page."""
-        return f"{self.address}/#/experiments/{self.id}/runs/{run}{rest}?workflowType=machine_learning"
+        return view.run_link(self.address, self.id, run, rest)
 
 
 def shoot(page: chromium.Page, study: Study, folder: Path) -> Iterator[Path]:

@@ -14,17 +14,16 @@ import os
 import random
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import time
-import urllib.request
 from collections import Counter
 from pathlib import Path
 
 from tests import soak_checks
 from tests.conftest import ROOM
+from tests.reports.mlflow_server import Server
 from tests.workflow.clones import Clone, take_frames
 from viewbench.reports._tracking import NO_TRACKING
 
@@ -127,8 +126,8 @@ class Soak:
         shutil.rmtree(self.clone.folder / "results", ignore_errors=True)
         watcher = soak_checks.Watcher(self.clone.results)
         watcher.start()
-        tracker = Tracker(self.clone.folder.parent / f"mlflow-{self.rounds}") if server else None
-        variables = {"VIEWBENCH_TRACKING_URI": tracker.uri} if tracker else self.untracked()
+        tracker = Server(self.clone.folder.parent / f"mlflow-{self.rounds}").start() if server else None
+        variables = {"VIEWBENCH_TRACKING_URI": tracker.url} if tracker else self.untracked()
         variables |= {"VIEWBENCH_FORK_SERVER": ""} if alone else {}
         sessions: list[int] = []
         try:
@@ -156,10 +155,10 @@ class Soak:
             last = self.start(variables)
             self.faults += [] if last.wait(RUN_S) == 0 else ["the last run failed"]
             if not self.small:
-                self.logged(tracker.uri if tracker else f"sqlite:///{self.clone.folder}/results/mlflow.db")
+                self.logged(tracker.url if tracker else f"sqlite:///{self.clone.folder}/results/mlflow.db")
         finally:
             if tracker:
-                tracker.stop()
+                tracker.stop(signal.SIGKILL)
             watcher.stop()
         self.looked += watcher.looked
         self.faults += watcher.wrong
@@ -183,7 +182,7 @@ class Soak:
             log.flush()
             return self.clone.begin(log, **variables)
 
-    def disturb(self, run: subprocess.Popen, kills: int, tracker: "Tracker | None") -> bool:
+    def disturb(self, run: subprocess.Popen, kills: int, tracker: Server | None) -> bool:
         """Kills up to so many of the run's processes at random; whether it came to its end and all was logged.
 
         `to_go` is then how many are left.
@@ -214,11 +213,12 @@ class Soak:
             self.clone.results / "reports" / "index.html"
         ).is_file()
 
-    def kill(self, kind: str, run: subprocess.Popen, tracker: "Tracker | None") -> bool:
+    def kill(self, kind: str, run: subprocess.Popen, tracker: Server | None) -> bool:
         """Kills one process of this kind; whether there was one."""
         if kind == "mlflow server":
             if tracker is not None:
-                tracker.kill()
+                tracker.stop(signal.SIGKILL)
+                tracker.start()
             return tracker is not None
         if kind == "snakemake":
             run.kill()
@@ -263,45 +263,6 @@ def is_of(kind: str, parent: int, line: str, run: subprocess.Popen) -> bool:
     if " --follow " in line:
         return kind == "follow"
     return "viewbench" in line and f" {kind} " in line and not line.startswith(("/bin/bash", "bash", "/bin/sh"))
-
-
-class Tracker:
-    """`mlflow server` on a database of its own, which can be killed and is started again."""
-
-    def __init__(self, folder: Path):
-        folder.mkdir()
-        self.folder = folder
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.port = free.getsockname()[1]
-        self.uri = f"http://127.0.0.1:{self.port}"
-        self.start()
-
-    def start(self) -> None:
-        command = [sys.executable, "-m", "mlflow", "server", "--host", "127.0.0.1", "--port", str(self.port)]
-        command += ["--backend-store-uri", f"sqlite:///{self.folder}/runs.db", "--workers", "1"]
-        command += ["--artifacts-destination", str(self.folder / "artifacts")]
-        environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true", "DO_NOT_TRACK": "true"}
-        with open(self.folder / "server.log", "ab") as log:
-            self.process = subprocess.Popen(
-                command, cwd=self.folder, env=environment, stdout=log, stderr=log, start_new_session=True
-            )
-        for _ in range(600):
-            try:
-                with urllib.request.urlopen(f"{self.uri}/health", timeout=5):
-                    return
-            except OSError:
-                assert self.process.poll() is None, (self.folder / "server.log").read_text()
-                time.sleep(0.1)
-        raise AssertionError("mlflow server does not answer")
-
-    def kill(self) -> None:
-        self.stop()
-        self.start()
-
-    def stop(self) -> None:
-        os.killpg(self.process.pid, signal.SIGKILL)
-        self.process.wait()
 
 
 if __name__ == "__main__":

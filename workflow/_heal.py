@@ -12,7 +12,7 @@ from ..common.cells import RECORDS, cell_folder
 from ..common.errors import UserError
 from ..common.files import read_json, sha256_file, unsealed
 from ..common.holding import sweep
-from ..reports._tracking import NO_TRACKING
+from ..reports._tracking_errors import NO_TRACKING
 from ..scenes.features import array
 from ._collect import COLUMNS, TABLE_SEAL
 from ._study import Study

@@ -16,8 +16,6 @@ from pathlib import Path
 from typing import Any
 
 from ..common.cells import AXES
-from ..reports import _tracked_link
-from ..reports._tracking_log import is_remote
 
 GRACE_S = 5.0  # for a request that is under way when the run ends
 NICE = 5  # below the trainings, whose seconds are measured
@@ -59,6 +57,9 @@ def start(workflow: Any, study: str, results: Path, uri: str) -> None:
 
 def say_where(results: str, uri: str) -> None:
     """Where Figure 4 of the study is to be seen, once it has been logged."""
+    from ..reports import _tracked_link
+    from ..reports._tracking_log import is_remote
+
     folder = Path(results)
     found = _tracked_link.figures(folder.parent, uri).get(folder.name) if uri else None
     if found:

@@ -120,9 +120,9 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         experiment = client.create_experiment("study")
         for panel in PANELS:
             for selector, colour in COLOURS.items():
-                tags = {view.KIND: view.SUMMARY, "mlflow.runColor": colour}
+                tags = {view.KIND: "summary", "mlflow.runColor": colour}
                 run = client.create_run(experiment, tags=tags, run_name=selector).info.run_id
-                metrics = [Metric(view.X, ratio, 0, step) for step, ratio in RATIOS.items()]
+                metrics = [Metric(view.SHARE, ratio, 0, step) for step, ratio in RATIOS.items()]
                 for name in (panel, "psnr_db", "ssim", "train_s"):
                     values = zip(RATIOS, height(panel, selector), strict=True)
                     metrics += [Metric(name, value, 0, step) for step, value in values]

@@ -70,15 +70,15 @@ def write_cell(results, row, psnr_db=20.0, ended="2026-01-02T03:04:20.000+00:00"
     return folder
 
 
-def describe(results):
+def describe(results, name="room"):
     """The description of the scene, on which a figure of its cameras can be drawn."""
     turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     positions = np.stack([np.cos(turn), np.sin(turn), 0.01 * np.sin(7 * turn)], 1)
-    record = {"schema": 1, "scene": "room", "n_train": 40, "n_test": 5, "width": 8, "height": 6, "points": []}
+    record = {"schema": 1, "scene": name, "n_train": 40, "n_test": 5, "width": 8, "height": 6, "points": []}
     record["train"] = {"positions": positions.tolist(), "forward": (-positions).tolist()}
     record["test"] = {"positions": positions[:5].tolist(), "forward": (-positions[:5]).tolist()}
     (results / "scenes").mkdir(parents=True, exist_ok=True)
-    (results / "scenes" / "room.json").write_text(json.dumps(record), encoding="utf-8")
+    (results / "scenes" / f"{name}.json").write_text(json.dumps(record), encoding="utf-8")
 
 
 @pytest.fixture
@@ -216,6 +216,14 @@ def psnr_of(row):
     return 15.0 + 10 * float(row["ratio"]) + int(row["seed"]) + (row["backend"] == "other")
 
 
+def one_backend(results):
+    """Cells of one backend at several ratios, and their study."""
+    rows = [row for row in RATIOS if row["backend"] == "splat"]
+    for row in rows:
+        write_cell(results, row, psnr_of(row))
+    return rows, about(rows=rows)
+
+
 def test_summaries_have_the_ratio_as_their_step(store):
     results, tracking = store
     for row in RATIOS:
@@ -244,10 +252,7 @@ def test_summaries_have_the_ratio_as_their_step(store):
 
 def test_a_summary_is_added_to_and_made_anew_where_a_number_has_changed(store):
     results, tracking = store
-    rows = [row for row in RATIOS if row["backend"] == "splat"]
-    for row in rows:
-        write_cell(results, row, psnr_of(row))
-    told = about(rows=rows)
+    rows, told = one_backend(results)
     track(results, tracking, rows[:2], told)
     client, (first,) = runs_of(tracking, "summary")
     assert history(client, first, "psnr_db") == [(5, 16.0)]
@@ -393,10 +398,7 @@ def test_cells_without_all_their_files_are_left_out(store):
 
 def test_a_cell_that_is_out_of_date_loses_its_run_and_its_place_in_the_summary(store):
     results, tracking = store
-    rows = [row for row in RATIOS if row["backend"] == "splat"]
-    for row in rows:
-        write_cell(results, row, psnr_of(row))
-    told = about(rows=rows)
+    rows, told = one_backend(results)
     track(results, tracking, rows, told)
 
     def again(sound):

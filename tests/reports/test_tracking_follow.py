@@ -172,7 +172,7 @@ def test_another_that_logs_the_study_is_not_waited_for(study):
     write_cell(results, ROWS[0])
     said = []
     one = follower(study, say=said.append)
-    with _tracking_turn.turn(tracking.uri, "demo", results, "another", 1):
+    with _tracking_turn.turn(tracking, "demo", results, "another"):
         looks(one, clock)
     assert said == []
     clock.now += _tracking_follow.AWAY_S
@@ -189,7 +189,7 @@ def test_what_others_have_logged_meanwhile_is_not_logged_again(study):
     for row in ROWS[1:]:
         write_cell(results, row)
     one.due()
-    with _tracking_turn.turn(tracking.uri, "demo", results, "the end of the study", 1):
+    with _tracking_turn.turn(tracking, "demo", results, "the end of the study"):
         _tracking.track(about(), ROWS, results, tracking)
     clock.now += SETTLE_S
     one.log(one.due())
@@ -272,10 +272,7 @@ class Process:
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "demo.yaml").write_text(STUDY)
-    describe(tmp_path / "results" / "demo")
-    (tmp_path / "results" / "demo" / "scenes" / "room.json").rename(
-        tmp_path / "results" / "demo" / "scenes" / "room_human.json"
-    )
+    describe(tmp_path / "results" / "demo", "room_human")
     return tmp_path
 
 

@@ -59,8 +59,7 @@ class Study:
     def make_cells(self) -> Path:
         """results/STUDY with all cells, no two of which have the same score."""
         results = self.folder / "made" / "results" / self.name
-        describe(results)
-        (results / "scenes" / "room.json").rename(results / "scenes" / "room_human.json")
+        describe(results, "room_human")
         for number, cell in enumerate(self.cells):
             write_cell(results, cell, psnr_db=20.0 + number / 8)
         return results

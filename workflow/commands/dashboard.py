@@ -46,8 +46,7 @@ def command(study: str | None, port: int, results: Path, links: bool) -> None:
         return
     arguments = ["server", "--backend-store-uri", _tracking.local_uri(uri), "--host", "127.0.0.1", "--port", str(port)]
     sys.stdout.flush()
-    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
-    os.environ.setdefault("DO_NOT_TRACK", "true")
+    _tracking.keep_quiet()
     os.execv(sys.executable, [sys.executable, "-m", "mlflow", *arguments])
 
 

@@ -113,20 +113,17 @@ def _publish(about: Any, folder: Path, tracking: Any) -> dict[str, str]:
 
 def _given_up(folder: Path) -> dict[str, Any]:
     """Why the cells were not logged a moment ago: the page need not wait for the same."""
-    from ...common.files import read_json
+    from ...reports import _tracking_stamp
 
-    stamps = [path for name in ("tracked", "tracked.partial") if (path := folder / f"{name}.json").is_file()]
-    newest = max(stamps, key=lambda path: path.stat().st_mtime_ns, default=None)
-    told = read_json(newest, "stamp of tracking") if newest else {}
-    return {"skipped": told["skipped"]} if isinstance(told, dict) and "skipped" in told else {}
+    told = _tracking_stamp.newest(folder)
+    return {"skipped": told["skipped"]} if "skipped" in told else {}
 
 
 def _turn(about: Any, folder: Path, tracking: Any) -> contextlib.AbstractContextManager[bool]:
     """While the body runs nobody else on this machine logs the study."""
     from ...reports import _tracking_turn
 
-    patience_s = max(tracking.patience, _tracking_turn.LEAST_S)
-    return _tracking_turn.turn(tracking.uri, about.name, folder, f"process {os.getpid()}", patience_s)
+    return _tracking_turn.turn(tracking, about.name, folder, f"process {os.getpid()}")
 
 
 def _import(recording: Path, name: str | None, settings: Any) -> None:
